@@ -29,6 +29,7 @@ ALLOWED = {
     "crazyflie_lqr.gain_file": "writes files of design_gains; reads by text_file.content",
     "crazyflie_link.address": "reads the parts of an address",
     "crazyflie_demo.joystick": "JoyNode alone opens a joystick",
+    "crazyflie_driver.vehicle_base": "a thread started by handle.start, whose output is input",
     **dict.fromkeys(
         (
             f"mocap_optitrack.{each}"
@@ -49,6 +50,23 @@ def modules():
 
 
 FILES = modules()
+ALLOWED |= dict.fromkeys(
+    (each for each in FILES if each.startswith("crazyflie_link.")),
+    "the driver alone uses links, as externals: crazyflie_driver.vehicle_link",
+)
+
+
+def test_the_driver_alone_makes_links():
+    """Of the modules that are nodes; in its place it has what is in the journal."""
+    makers = {
+        name
+        for node in CLASSES
+        for name in reachable(node.__module__)
+        if not name.startswith("crazyflie_link.")
+        and {"crazyflie_link.crazyflie.Crazyflie", "crazyflie_link.broadcast.Broadcaster"}
+        & set(own_imports(ast.parse(FILES[name].read_text())))
+    }
+    assert makers == {"crazyflie_driver.vehicle_link"}
 
 
 def calls(tree):

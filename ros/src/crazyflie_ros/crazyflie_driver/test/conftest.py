@@ -52,8 +52,8 @@ PARAMETERS = {
 class Server:
     """The driver on a fake process."""
 
-    def __init__(self, parameters=None):
-        self.process = FakeProcess()
+    def __init__(self, parameters=None, recorder=None):
+        self.process = FakeProcess(recorder=recorder)
         self.node = CrazyflieServerNode()
         assert self.process.launch(self.node, "/crazyflie_server", parameters)
         self.vehicles = []

@@ -97,7 +97,7 @@ def test_a_takeoff_that_was_too_late_is_not_sent_after_its_refusal(swarm, monkey
 
     def check_and_upload(command):
         checked = check(command)
-        driven.jobs.submit("an upload", lambda _: free.wait(60.0))
+        driven.jobs.submit("an upload", lambda _: driven.handle.outside(free.wait, 60.0))
         return checked
 
     monkeypatch.setattr(driven.commands, "check", check_and_upload)

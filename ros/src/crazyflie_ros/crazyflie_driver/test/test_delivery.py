@@ -15,21 +15,28 @@ class Handle:
         self.busy = threading.Event()
         self.free = threading.Event()
 
-    def submit(self, callback, *arguments):
-        self.busy.set()
-        self.free.wait(LIMIT)
-        callback(*arguments)
+    def input(self, callback):
+        def pass_on(argument):
+            self.busy.set()
+            self.free.wait(LIMIT)
+            callback(argument)
+
+        return pass_on
+
+    def start(self, begin):
+        begin()
 
 
 def test_order_is_kept_and_only_data_are_dropped():
     handle = Handle()
     delivery = Delivery(handle, "test")
     called = queue.Queue()
-    delivery.submit(called.put, "first")
+    submit, submit_data = delivery.outlet(called.put), delivery.outlet(called.put, are_data=True)
+    submit("first")
     assert handle.busy.wait(LIMIT)
     for k in range(MAX_WAITING + 10):
-        delivery.submit_data(called.put, k)
-    delivery.submit(called.put, "last")
+        submit_data(k)
+    submit("last")
     handle.free.set()
     expected = ["first", *range(MAX_WAITING), "last"]
     assert [called.get(timeout=LIMIT) for _ in expected] == expected
@@ -40,11 +47,12 @@ def test_nothing_is_called_after_the_end():
     handle = Handle()
     delivery = Delivery(handle, "test")
     called = queue.Queue()
-    delivery.submit(called.put, "at work")
+    submit = delivery.outlet(called.put)
+    submit("at work")
     assert handle.busy.wait(LIMIT)
-    delivery.submit(called.put, "waiting")
+    submit("waiting")
     delivery.close()
     thread = next(each for each in threading.enumerate() if each.name == "test-delivery")
     handle.free.set()
     thread.join(LIMIT)
-    assert [called.get(timeout=LIMIT), called.empty()] == ["at work", True]
+    assert called.empty()

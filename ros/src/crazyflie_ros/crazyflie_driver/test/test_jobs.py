@@ -6,6 +6,7 @@ import pytest
 
 from crazyflie_driver.vehicle_base import MOST_JOBS, Jobs
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 60.0
 
@@ -13,27 +14,56 @@ LIMIT = 60.0
 class Slow:
     """A job that goes on until it is told, or given up."""
 
-    def __init__(self):
+    def __init__(self, handle):
         self.has_begun = threading.Event()
         self.free = threading.Event()
+        self._handle = handle
 
     def __call__(self, job):
         self.has_begun.set()
-        while not self.free.wait(0.01):
+        while not self.free.is_set():
+            self._handle.outside(self.free.wait, 0.01)
             job.check()
         return "done"
 
 
+class TurnJobs:
+    """Jobs that are submitted in turn, as by callbacks."""
+
+    def __init__(self, process, on_error=lambda text: None):
+        self._process = process
+        self._jobs = Jobs("test", process.handle("/driver").task, on_error)
+
+    def submit(self, *arguments, **named):
+        return self._in_turn(lambda: self._jobs.submit(*arguments, **named))
+
+    def supersede(self, what):
+        self._in_turn(lambda: self._jobs.supersede(what))
+
+    def close(self):
+        self._in_turn(self._jobs.close)
+
+    def _in_turn(self, work):
+        results = []
+        self._process.executor.submit(lambda: results.append(work()))
+        return results[0]
+
+
 @pytest.fixture
-def jobs():
-    jobs = Jobs("test")
+def process():
+    return FakeProcess()
+
+
+@pytest.fixture
+def jobs(process):
+    jobs = TurnJobs(process)
     yield jobs
     jobs.close()
 
 
 @pytest.fixture
-def slow(jobs):
-    slow = Slow()
+def slow(process, jobs):
+    slow = Slow(process.handle("/driver"))
     yield slow
     slow.free.set()
 
@@ -69,13 +99,13 @@ def test_an_urgent_job_goes_beside_one_that_cannot_be_given_up(jobs, slow):
     assert writing.result(LIMIT) == "done"
 
 
-def test_a_running_job_that_is_too_late_to_be_given_up_tells_how_it_ended(jobs):
+def test_a_running_job_that_is_too_late_to_be_given_up_tells_how_it_ended(process, jobs):
     """A caller is not told that a command failed which the vehicle has accepted meanwhile."""
     begun, free = threading.Event(), threading.Event()
 
     def send(job):
         begun.set()
-        free.wait(LIMIT)
+        process.handle("/driver").outside(free.wait, LIMIT)
         return job.may_send()
 
     go_to = jobs.submit("test", send, is_flight=True)
@@ -107,9 +137,9 @@ def test_an_error_is_the_callers(jobs):
     assert jobs.submit("test", lambda _: 1).result(LIMIT) == 1
 
 
-def test_an_error_that_nobody_expects_is_logged():
+def test_an_error_that_nobody_expects_is_logged(process):
     errors = []
-    jobs = Jobs("test", errors.append)
+    jobs = TurnJobs(process, errors.append)
     done = jobs.submit("the test", lambda _: int("one"))
     with pytest.raises(ValueError, match="one"):
         done.result(LIMIT)
@@ -118,11 +148,14 @@ def test_an_error_that_nobody_expects_is_logged():
 
 
 def test_calls_without_an_answer_leave_no_threads(jobs, slow):
+    running = jobs.submit("test", slow)
+    assert slow.has_begun.wait(LIMIT)
     count = threading.active_count()
     waiting = [jobs.submit("test", slow) for _ in range(3 * MOST_JOBS)]
     assert threading.active_count() == count
     with pytest.raises(ServiceError, match=f"{MOST_JOBS} calls wait"):
         waiting[-1].result(LIMIT)
+    assert not running.done()
 
 
 def test_nothing_is_done_after_the_end(jobs):

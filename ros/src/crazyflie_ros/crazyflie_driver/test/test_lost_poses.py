@@ -1,6 +1,7 @@
 """External poses that stop while a vehicle flies by its own estimate of them."""
 
 import math
+import threading
 
 import pytest
 from genpy import Duration
@@ -37,11 +38,12 @@ def pass_time(server, duration, fed=True, stream=None):
             server.process.publish("/cf1/external_position", _POINT)
         if stream is not None:
             stream(server)
-        states = log._states
+        state_came = threading.Event()
+        log._state_news._awaited.append(state_came)
         # A state is logged every 0.1 s.
         for _ in range(2):
             server.process.advance(_PERIOD)
-        wait_until(lambda states=states: log._states > states, "the log")
+        wait_until(state_came.is_set, "the log")
 
 
 def landings(vehicle):

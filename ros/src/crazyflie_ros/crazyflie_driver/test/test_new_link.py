@@ -136,7 +136,7 @@ def test_the_first_zero_of_a_user_unlocks_what_nothing_is_known_of(server):
 
 
 def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
-    """No callback has its turn then; log data that are old would have the motors stopped."""
+    """Log data that are old would have the motors stopped."""
     vehicle = make_old_vehicle(server, FLYING)
     server.add(vehicle.uri)
     wait_for_words(server, "flying")
@@ -147,7 +147,7 @@ def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
         is_(vehicle, HIGH_LEVEL)
 
     threading.Thread(target=obey, daemon=True).start()
-    server.process.executor.submit(server.node.shutdown)
+    server.process.shut_down({"/crazyflie_server": server.node})
     assert commands(vehicle) == [(7, 1), (8, 0)]
 
 

@@ -1,6 +1,7 @@
 """Parameters that are written to a vehicle, and again when it may have lost them."""
 
 import threading
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -136,7 +137,9 @@ def test_a_link_that_is_lost_meanwhile_stops_them(mirror):
 def test_a_master_that_is_frozen_does_not_block_the_jobs_of_a_vehicle(server, vehicle, monkeypatch):
     """It accepts connections, and never answers."""
     answers = threading.Event()
-    monkeypatch.setattr(server.process.transport, "get_param", lambda name: answers.wait(20.0))
+    transport = server.process.transport
+    ask = partial(transport.outside, answers.wait, 20.0)
+    monkeypatch.setattr(transport, "get_param", lambda name: ask())
     monkeypatch.setattr("crazyflie_driver.services.MASTER_LIMIT", 0.1)
     names = ["effect", "ring/effect", "ring/neopixel"]
     update = server.process.call("/cf1/update_params", UpdateParamsRequest(names))

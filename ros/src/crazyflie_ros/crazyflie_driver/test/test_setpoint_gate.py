@@ -1,8 +1,5 @@
 """Which setpoints are passed on."""
 
-import threading
-from functools import partial
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -151,45 +148,6 @@ def test_an_emergency_and_a_removal_are_for_good(lost):
     assert lost.refusal(9.0, ZERO) == "the vehicle is being removed"
     lost.handle(GateEvent.EMERGENCY_STOP)
     assert lost.refusal(19.0, ZERO) == "emergency stop"
-
-
-class Moment(float):
-    """A time (s) at which something happens in another thread, while a gate computes with it."""
-
-    def __new__(cls, value, event):
-        moment = super().__new__(cls, value)
-        moment.thread = threading.Thread(target=event)
-        return moment
-
-    def __sub__(self, other):
-        if not self.thread.ident:
-            self.thread.start()
-            # It may have to wait until the gate has decided.
-            self.thread.join(0.2)
-        return float(self) - other
-
-
-def test_a_link_that_is_lost_while_a_setpoint_is_decided_about_blocks_the_stream():
-    gate = opened()
-    stream(gate, 0.0, 1.0)
-    moment = Moment(1.0, partial(gate.handle, GateEvent.LINK_LOST))
-    assert gate.refusal(moment, THRUST) == ""
-    moment.thread.join()
-    assert gate.refusal(1.02, THRUST) == "the link is lost"
-    gate.handle(GateEvent.LINK_BACK)
-    assert stream(gate, 1.04, 2.0)[1].startswith("the link was lost")
-
-
-def test_nothing_changes_while_a_setpoint_is_sent():
-    gate = opened()
-    with gate.passing(0.0, THRUST) as refusal:
-        assert refusal == ""
-        command = threading.Thread(target=gate.high_level, args=(0.0,))
-        command.start()
-        command.join(0.2)
-        assert command.is_alive()
-    command.join()
-    assert gate.refusal(0.1, THRUST) == "the vehicle was just given a high-level command"
 
 
 def test_a_command_that_fails_lets_setpoints_pass_but_not_after_another_one():

@@ -196,7 +196,8 @@ def test_a_vehicle_without_decks_takes_off_once_its_estimator_is_the_kalman_filt
         def is_ready():
             server.process.advance(0.02)
             server.process.publish("/cf1/external_pose", PoseStamped(pose=POSE))
-            return not (log.estimate_problem() or log.variances.problem())
+            problem = log.estimate_problem() or log.variances.problem()
+            return log.variances.are_enough and not problem
 
         wait_until(is_ready, "an estimate at the poses")
         server.call("/cf1/takeoff", TAKEOFF)

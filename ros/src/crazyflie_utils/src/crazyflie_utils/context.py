@@ -3,13 +3,15 @@
 import math
 import time
 import traceback
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
+from crazyflie_utils.tasks import Tasks
 from crazyflie_utils.tf.transforms import (
     MAX_CLOCK_DELAY_SIMULATED,
     MAX_FUTURE_STAMP,
@@ -222,10 +224,12 @@ class ProcessContext:
     ):
         self.executor, given = executor or Executor(), transport
         transport.is_in_callback = lambda: self.executor.is_running_here
+        self.tasks = self._make_tasks()
         self.recorder = recorder  #: A `Recorder`, whose module is loaded only if there is one.
         machine_clock = SteadyClock()
         if recorder is not None:
             transport = recorder.attach(transport, self.executor)
+            self.tasks.on_turn = recorder.task
             machine_clock = recorder.clock
         self.transport = transport
         self.topics = Topics(transport)
@@ -233,6 +237,7 @@ class ProcessContext:
             SimulatedClock() if use_sim_time else machine_clock
         )
         given.time = transport.time = self.clock.time
+        given.outside = self.tasks.outside
         tf_log = NodeLog(transport, "/tf", self.machine_time)
         self.transforms = Transforms(
             self.topics,
@@ -264,6 +269,21 @@ class ProcessContext:
             self.topics.subscribe("/clock", Clock, lambda message: move(message.clock.to_sec()))
 
     is_replay = False  #: Whether a journal has all that comes from outside.
+
+    def _make_tasks(self):
+        return Tasks(self.executor)
+
+    def value(
+        self,
+        what: str,
+        read: Callable[[], Any],
+        waits: bool = False,
+        errors: Mapping[str, type[Exception]] = MappingProxyType({}),
+    ) -> Any:
+        """Return, or raise, the outcome of ``read()``; see `NodeHandle.value`."""
+        if waits:
+            read = partial(self.tasks.outside, read)
+        return read() if self.recorder is None else self.recorder.value(what, read, errors)
 
     def end(self, status: int) -> None:
         """Shut the process down; it exits with ``status``."""

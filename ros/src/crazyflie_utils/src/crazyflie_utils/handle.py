@@ -3,9 +3,10 @@
 import contextlib
 import math
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from functools import partial
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import genpy
@@ -346,6 +347,46 @@ class NodeHandle:
         """
         if not self._process.is_replay:
             begin()
+
+    def task(self, name: str, work: Callable[[], None]) -> None:
+        """Do ``work()``, which waits for something outside by `outside`, or by `value`.
+
+        It has a thread with a name, and its turn like a callback while it does not wait.
+        """
+
+        def run():
+            try:
+                work()
+            except Exception as error:
+                self.report_fault(work, error)
+
+        self._process.tasks.start(name, run)
+
+    def outside(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Call ``call(*arguments)``, which waits: the turn of a task is given up meanwhile.
+
+        It is not called in a replay.
+        """
+        self._process.tasks.outside(call, *arguments)
+
+    def value(
+        self,
+        what: str,
+        read: Callable[[], Any],
+        waits: bool = False,
+        errors: Mapping[str, type[Exception]] = MappingProxyType({}),
+    ) -> Any:
+        """Return, or raise, the outcome of ``read()``, which a replay takes from the journal.
+
+        What was read has a name there, and must be JSON. If it ``waits``, the turn of a task is
+        given up meanwhile. ``errors`` are those that it may raise beside Python's own, by name.
+        """
+        return self._process.value(what, read, waits, errors)
+
+    @property
+    def is_replay(self) -> bool:
+        """Whether a journal has all that comes from outside, which is not there."""
+        return self._process.is_replay
 
     def random_seed(self) -> int:
         """Return a random seed, 32 bits: callbacks draw no random numbers elsewhere."""

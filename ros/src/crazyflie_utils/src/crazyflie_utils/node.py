@@ -1,6 +1,8 @@
 """The base class of all nodes, and the process in which they run."""
 
+import threading
 import traceback
+from functools import partial
 from typing import Any, ClassVar, Generic, get_args
 
 from typing_extensions import TypeVar
@@ -126,9 +128,25 @@ class Process(ProcessContext):
         self._post_all("PREPARE_SHUTDOWN", [begin, *works])
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
-        """Stop all timers, and make the vehicle of every node safe."""
+        """Stop all timers, and make the vehicle of every node safe; wait for that."""
+        has_ended = self.begin_shutdown(nodes)
+        if self.executor.is_started:
+            has_ended.wait()
+
+    def begin_shutdown(self, nodes: dict[str, Node]) -> threading.Event:
+        """Do the same as a task, whose end is an event: a node may wait for its vehicle."""
         works = [self.handle(name).guard(node.shutdown) for name, node in nodes.items()]
-        self._post_all("SHUTDOWN", [self.stop, *works])
+        has_ended = threading.Event()
+
+        def work():
+            try:
+                for each in works:
+                    each()
+            finally:
+                has_ended.set()
+
+        self._post_all("SHUTDOWN", [self.stop, partial(self.tasks.start, "shutdown", work)])
+        return has_ended
 
     def _post_all(self, kind, works):
         def run():

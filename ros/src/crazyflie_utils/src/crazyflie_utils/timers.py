@@ -167,6 +167,11 @@ class Executor:
             self._drain()
 
     @property
+    def is_started(self) -> bool:
+        """Whether work is run."""
+        return self._started
+
+    @property
     def is_running_here(self) -> bool:
         """Whether this thread runs work at present."""
         return self._runner == threading.get_ident()
@@ -209,6 +214,20 @@ class Executor:
             self._drain(works)
         else:
             self._consequences.extend((work, ()) for work in works)
+
+    def take_turn(self) -> None:
+        """Wait for the turn of this thread, which lasts until `end_turn`; inputs before it run."""
+        self._running.__enter__()
+        self._runner = threading.get_ident()
+        self._run_queued()
+
+    def end_turn(self) -> None:
+        """Run what the work of this thread has submitted, and end its turn."""
+        try:
+            self._run_queued()
+        finally:
+            self._runner = None
+            self._running.__exit__()
 
     def _drain(self, works=()):
         if not self._started:

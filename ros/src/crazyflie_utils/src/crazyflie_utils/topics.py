@@ -64,6 +64,8 @@ class Transport(ABC):
 
     #: Whether this thread runs callbacks, which must not wait for the master.
     is_in_callback: Condition = staticmethod(never)
+    #: Calls what waits for the master: ``outside(call, *arguments)``; see `Tasks.outside`.
+    outside: Callable[..., Any] = staticmethod(lambda call, *arguments: call(*arguments))
     time: Callable[[], float]  #: The clock of the process, s.
 
     def starting(self) -> AbstractContextManager[None]:

@@ -143,11 +143,12 @@ class FlightState:
             estimator = self._vehicle.crazyflie.parameters.known(ESTIMATOR)
         except LinkLostError:
             return ""
-        return self._log.variances.problem() if estimator == KALMAN else ""
+        return self._log.variances_problem() if estimator == KALMAN else ""
 
-    def motion_sent(self) -> None:
-        """Record that the planner is commanded to move."""
-        self._planned, self._plan_end = self._vehicle.handle.time(), math.inf
+    def motion_sent(self, moment: float) -> None:
+        """Record that the planner was commanded to move, at a time (s)."""
+        if moment > self._planned:
+            self._planned, self._plan_end = moment, math.inf
 
     def end_accepted(self, duration: float) -> None:
         """Record that the planner stops the motors after a duration (s)."""

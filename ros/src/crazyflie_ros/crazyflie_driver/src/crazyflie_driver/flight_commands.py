@@ -2,9 +2,10 @@
 
 import contextlib
 import enum
-import time
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 from crazyflie_driver.commands import (
     LAND,
@@ -114,6 +115,9 @@ class FlightCommands:
         if self._vehicle.gate.is_emergency or self._setpoints.is_streaming:
             return False
         return self._flight.is_high_level(self._log.supervisor)
+
+    def __post_init__(self) -> None:
+        self._deliver_sent = self._vehicle.delivery.outlet(self._note_sent)
 
     def start(self) -> None:
         """Begin to feed the watchdog, once there is a flight."""
@@ -316,27 +320,27 @@ class FlightCommands:
 
     def _wait_for_spin_up(self, supervisor: Supervisor, job: Job) -> None:
         # Until it can fly, the firmware refuses a takeoff.
-        end = time.monotonic() + _SPIN_UP_LIMIT
+        end = self._vehicle.monotonic() + _SPIN_UP_LIMIT
         while (state := supervisor.read()) is not None and SupervisorState.CAN_FLY not in state:
             job.check()
-            if state.faults or time.monotonic() > end:
+            if state.faults or self._vehicle.monotonic() > end:
                 raise ServiceError(
                     f"the vehicle was armed, and cannot fly within {_SPIN_UP_LIMIT:g} s: see that "
                     f"each motor turns freely; its state is: {state.words()}"
                 )
-            time.sleep(_REARMING / 10)
+            self._vehicle.sleep(_REARMING / 10)
 
     def _state_once_armed(self, supervisor: Supervisor, job: Job) -> SupervisorState | None:
-        end = time.monotonic() + _REARMING
+        end = self._vehicle.monotonic() + _REARMING
         while True:
             job.check()
             state = supervisor.read()
-            if state is None or time.monotonic() > end:
+            if state is None or self._vehicle.monotonic() > end:
                 return state
             rearms = SupervisorState.AUTO_ARMED in state
             if not rearms or state.faults or SupervisorState.CAN_FLY in state:
                 return state
-            time.sleep(_REARMING / 10)
+            self._vehicle.sleep(_REARMING / 10)
 
     # Sending.
 
@@ -371,35 +375,48 @@ class FlightCommands:
             gate.handle(GateEvent.FLIGHT_CALLED)
             self._feeds_watchdog = True
 
-    def _prepare_sending(self, command, job):
-        # In the thread that sends: what is sent next is the command itself.
+    def _prepare_sending(self, command, job, sent):
+        # In the thread that sends, which changes nothing here: what is sent next is the command
+        # itself.
         if not job.may_send() or self._vehicle.gate.is_emergency:
             return False
+        is_notified = self._setpoints.may_have_priority
         # If they have none, the notice makes the next command begin at the estimated state.
-        if self._setpoints.may_have_priority:
+        if is_notified:
+            notify = self._vehicle.crazyflie.target.setpoints.notify_setpoints_stop
             try:
-                self._setpoints.notify_setpoints_stop(self._pending_notify or 0, at_once=True)
+                notify(self._pending_notify or 0, at_once=True)
             except LinkLostError:
                 return False
-        self._pending_notify = None
-        if not command.ends_flight:
-            self._flight.motion_sent()
+        sent[:] = self._vehicle.handle.time(), is_notified, not command.ends_flight
+        self._deliver_sent(*sent)
         return True
+
+    def _note_sent(self, moment, is_notified, is_motion):
+        if is_notified:
+            self._setpoints.was_notified(moment)
+        self._pending_notify = None
+        if is_motion:
+            self._flight.motion_sent(moment)
 
     def _send_and_look_up(self, command, job, number):
         was_at_rest = self._flight.is_at_rest()
-        is_sent = False
+        # Of the latest sending, what `_note_sent` needs.
+        sent: list[Any] = []
+        may_send = partial(self._prepare_sending, command, job, sent)
 
-        def may_send():
-            nonlocal is_sent
-            may = self._prepare_sending(command, job)
-            is_sent = is_sent or may
-            return may
+        def note_sent():
+            # Its delivery may come later.
+            known = self._vehicle.handle.value("what was sent", lambda: list(sent))
+            if known:
+                self._note_sent(*known)
+            return bool(known)
 
         try:
             command.send(self._vehicle.crazyflie.high_level.guarded(may_send))
+            note_sent()
         except (NoReplyError, LinkLostError) as error:
-            if command.ends_flight or not is_sent:
+            if not note_sent() or command.ends_flight:
                 raise
             state, obeys = self._state_after(command, job, was_at_rest)
             if state is None:
@@ -414,14 +431,14 @@ class FlightCommands:
     def _state_after(self, command, job, was_at_rest):
         # Returns the state, None if the vehicle is silent, and whether it shows that it obeys.
         # The vehicle answers in the order in which it receives. It shows a command a little later.
-        end = time.monotonic() + _LOOK_UP_LIMIT
+        end = self._vehicle.monotonic() + _LOOK_UP_LIMIT
         answered = None
         while job.may_send():
             try:
                 state = self._flight.read()
             except LinkLostError:
                 state = None
-            now = time.monotonic()
+            now = self._vehicle.monotonic()
             if state is not None:
                 answered = now if answered is None else answered
                 obeys = self._is_obeyed(command, state, was_at_rest)
@@ -429,7 +446,7 @@ class FlightCommands:
                     return state, obeys
             elif now > end:
                 break
-            time.sleep(_LOOK_UP_PERIOD)
+            self._vehicle.sleep(_LOOK_UP_PERIOD)
         return None, False
 
     def _is_obeyed(self, command, state, was_at_rest):

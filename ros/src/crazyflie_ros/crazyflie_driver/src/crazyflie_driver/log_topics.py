@@ -1,7 +1,6 @@
 """Log data and application packets of a vehicle, as topics."""
 
 import math
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -24,7 +23,7 @@ from crazyflie_driver.positioning import (
     check_deck,
     estimator_problem,
 )
-from crazyflie_driver.vehicle_base import BaseVehicle, ConnectionState
+from crazyflie_driver.vehicle_base import BaseVehicle, ConnectionState, News
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock, quaternion_from_compressed
 from crazyflie_model.supervisor import SupervisorState
@@ -117,6 +116,8 @@ STATUS_VARIABLES = (
     "ctrltargetZ.z",
 )
 
+_VARIANCES_LIMIT = 2.0  #: Time in which variances come on a link, s: four of their periods.
+
 _MOST_DATA = 30
 _LINK = 3 << 2  #: Bits of the header that belong to the link; cflib sets them.
 
@@ -153,10 +154,10 @@ class LogTopics:
     positioning: Positioning | None = None
     _packets: Publisher | None = None
     _logs_state: bool = False
-    _states: int = 0
-    _state_came: threading.Condition = field(default_factory=threading.Condition)
 
     def __post_init__(self) -> None:
+        self._state_news, self._variances_news = (News(self._vehicle.handle) for _ in range(2))
+        self._deliver_packet = self._vehicle.delivery.outlet(self._publish_packet, are_data=True)
         server = self._vehicle.server
         self.battery = BatteryMonitor(
             server.battery_low, server.battery_critical, server.battery_critical_time
@@ -215,25 +216,41 @@ class LogTopics:
         """
         if not self._logs_state:
             return None
-        with self._state_came:
-            before = self._states
-            is_there = self._state_came.wait_for(lambda: self._states != before, limit)
-            return self.supervisor if is_there else None
+        return self.supervisor if self._state_news.wait(limit) else None
+
+    def variances_problem(self) -> str:
+        """Return why the Kalman filter has not converged, empty if it has, or unknown; blocks."""
+        while not self.variances.are_enough and self._variances_news.wait(_VARIANCES_LIMIT):
+            pass
+        return self.variances.problem()
 
     def publish_packet(self, port: int, channel: int, data: bytes) -> None:
         """Publish a packet from the vehicle, unless it is for the driver; from any thread."""
-        publisher = self._packets
-        if publisher is None or port in _OWN_PORTS:
-            return
-        message = crtpPacket(
-            size=1 + len(data),
-            header=port << 4 | _LINK | channel,
-            data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
-        )
-        self._vehicle.delivery.submit_data(publisher.publish, message)
+        if self._packets is not None and port not in _OWN_PORTS:
+            self._deliver_packet(port, channel, data.hex())
 
-    def _log(self, name, period_ms, variables, deliver):
-        self._vehicle.crazyflie.add_log_block(LogBlock(name, period_ms, tuple(variables), deliver))
+    def _publish_packet(self, port, channel, text):
+        if self._packets is not None:
+            data = bytes.fromhex(text)
+            self._packets.publish(
+                crtpPacket(
+                    size=1 + len(data),
+                    header=port << 4 | _LINK | channel,
+                    data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
+                )
+            )
+
+    def _log(self, name, period_ms, variables, receive):
+        """Start a block; ``receive(arrival, time_ms, values)`` is called in turn, s and ms."""
+        handle = self._vehicle.handle
+        deliver = self._vehicle.delivery.outlet(receive, are_data=True)
+        block = LogBlock(
+            name,
+            period_ms,
+            tuple(variables),
+            lambda time_ms, values: deliver(handle.time(), time_ms, values),
+        )
+        self._vehicle.crazyflie.add_log_block(block)
 
     def _start_status(self, known):
         vehicle = self._vehicle
@@ -241,13 +258,11 @@ class LogTopics:
         variables = [variable for variable in STATUS_VARIABLES if variable in known]
         self._logs_state = "supervisor.info" in known
 
-        def deliver(_, values):
-            latest = dict(zip(variables, values, strict=True))
-            self._note_state(latest)
-            vehicle.delivery.submit_data(self._note_status, latest, *publishers)
+        def receive(_arrival, _time_ms, values):
+            self._note_status(dict(zip(variables, values, strict=True)), *publishers)
 
         if variables:
-            self._log("status", STATUS_PERIOD_MS, variables, deliver)
+            self._log("status", STATUS_PERIOD_MS, variables, receive)
 
     def _start_filter(self, known):
         # In one block of 24 bytes: the firmware has room for 16 blocks.
@@ -258,14 +273,15 @@ class LogTopics:
         size = len(VARIANCES) if logs_variances else 0
         variables = (*VARIANCES[:size], *(ESTIMATE if logs_position else ()))
 
-        def deliver(_, values):
+        def receive(_arrival, _time_ms, values):
             if logs_variances:
-                self.variances.add(values[:size])
+                self.variances.add(tuple(values[:size]))
+                self._variances_news.tell()
             if logs_position:
-                self._vehicle.delivery.submit_data(self._note_estimate, values[size:])
+                self._note_estimate(values[size:])
 
         if variables:
-            self._log("filter", VARIANCES_PERIOD_MS, variables, deliver)
+            self._log("filter", VARIANCES_PERIOD_MS, variables, receive)
 
     def _note_estimate(self, position):
         now = self._vehicle.handle.time()
@@ -297,11 +313,11 @@ class LogTopics:
                 before = text
                 publisher.publish(String(text))
 
-        def deliver(_, values):
-            positioning.update(vehicle.handle.time(), values)
-            vehicle.delivery.submit(follow)
+        def receive(arrival, _time_ms, values):
+            positioning.update(arrival, values)
+            follow()
 
-        self._log("positioning", PERIOD_MS, system.variables, deliver)
+        self._log("positioning", PERIOD_MS, system.variables, receive)
         vehicle.handle.timer(PERIOD_MS / 1000.0, follow)
         self._start_estimate(positioning)
 
@@ -312,8 +328,8 @@ class LogTopics:
         publisher = self._vehicle.publisher(_POSE.name, PoseStamped)
         broadcast = handle.broadcast_transforms()
 
-        def stamp_of(time_ms):
-            time = positioning.local_time(time_ms / 1000.0, handle.time())
+        def stamp_of(arrival, time_ms):
+            time = positioning.local_time(time_ms / 1000.0, arrival)
             return None if time is None else handle.stamp(time)
 
         def publish(stamp, values):
@@ -328,15 +344,10 @@ class LogTopics:
 
         self._log_stamped(_POSE.name, FAST_MS, _POSE.variables, publish, stamp_of)
 
-    def _note_state(self, latest):
-        # In the link's thread: the state is waited for where no callback has its turn.
-        if "supervisor.info" in latest:
-            with self._state_came:
-                self.supervisor = SupervisorState(latest["supervisor.info"])
-                self._states += 1
-                self._state_came.notify_all()
-
     def _note_status(self, latest, heading_publisher, rssi_publisher):
+        if "supervisor.info" in latest:
+            self.supervisor = SupervisorState(latest["supervisor.info"])
+            self._state_news.tell()
         if "pm.vbat" in latest:
             self.battery.update(latest["pm.vbat"], self._vehicle.handle.time())
         self.power_state = latest.get("pm.state", VehicleStatus.PM_STATE_UNKNOWN) & 0xFF
@@ -397,16 +408,16 @@ class LogTopics:
         self._log_stamped(block.topic_name, period, block.variables, publish, self._stamp)
 
     def _log_stamped(self, name, period_ms, variables, publish, stamp_of):
-        def deliver(time_ms, values):
-            stamp = stamp_of(time_ms)
+        def receive(arrival, time_ms, values):
+            stamp = stamp_of(arrival, time_ms)
             if stamp is not None:
-                self._vehicle.delivery.submit_data(publish, stamp, values)
+                publish(stamp, values)
 
-        self._log(name, period_ms, variables, deliver)
+        self._log(name, period_ms, variables, receive)
 
-    def _stamp(self, time_ms):
+    def _stamp(self, arrival, time_ms):
         if self._vehicle.parameters.use_ros_time:
-            return self._vehicle.handle.stamp()
+            return self._vehicle.handle.stamp(arrival)
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
 
     def _header(self, stamp, in_world):

@@ -1,7 +1,6 @@
 """Monitors of a vehicle's log: its battery, its estimator, its liftoff and its touchdown."""
 
 import enum
-import threading
 from typing import NamedTuple
 
 from crazyflie_driver.setpoint_gate import STREAM_PAUSE
@@ -68,37 +67,31 @@ VARIANCES, VARIANCES_PERIOD_MS = ("kalman.varPX", "kalman.varPY", "kalman.varPZ"
 WINDOW = 10
 MAX_CHANGE = 0.001
 FEWEST = 3  #: The shortest window.
-_VARIANCES_LIMIT = 2.0  #: Time in which `FEWEST` samples come after the link has been set up, s.
 
 
 class Variances:
-    """Whether a Kalman filter has converged; samples are added in one thread, read in another."""
+    """Whether a Kalman filter has converged, by samples of `VARIANCES`."""
 
     def __init__(self) -> None:
         self._samples: tuple[tuple[float, ...], ...] = ()
-        self._came = threading.Condition()
         self.is_logged = False
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether there are as many samples as `problem` needs, or none are logged."""
+        return not self.is_logged or len(self._samples) >= FEWEST
 
     def add(self, sample: tuple[float, ...]) -> None:
         """Add a sample of `VARIANCES`."""
-        with self._came:
-            self._samples = (*self._samples, sample)[-WINDOW:]
-            self._came.notify_all()
+        self._samples = (*self._samples, sample)[-WINDOW:]
 
     def clear(self) -> None:
         """Forget all samples: the filter may have been restarted."""
         self._samples = ()
 
     def problem(self) -> str:
-        """Return the evidence that the filter has not converged; empty without any.
-
-        Blocks until there are samples, if they are logged; without any, nothing is known.
-        """
-        if not self.is_logged:
-            return ""
-        with self._came:
-            self._came.wait_for(lambda: len(self._samples) >= FEWEST, _VARIANCES_LIMIT)
-            samples = self._samples
+        """Return the evidence that the filter has not converged; empty without any."""
+        samples = self._samples
         if len(samples) < FEWEST:
             return ""
         windows = [samples[-size:] for size in range(FEWEST, len(samples) + 1)]

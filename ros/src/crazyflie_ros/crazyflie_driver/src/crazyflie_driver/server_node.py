@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future, wait
 from functools import partial
 from typing import Any
@@ -26,12 +26,9 @@ from crazyflie_driver.srv import AddCrazyflie, RemoveCrazyflie
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_base import Job
+from crazyflie_driver.vehicle_link import radio_channel
 from crazyflie_link.address import Address
-from crazyflie_link.broadcast import Broadcaster, SharedCommand
 from crazyflie_link.errors import AddressError, CrazyflieError, LinkLostError
-from crazyflie_link.link import Link
-from crazyflie_link.localization import PackedPoses
-from crazyflie_link.supervisor import BROADCAST_STOP
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.context import are_related
 from crazyflie_utils.refusal import refusals_text
@@ -54,19 +51,19 @@ class Channel:
     vehicles of another dongle, which may be out of reach of this one, get their own.
     """
 
-    def __init__(self, address: Address, parameters: BroadcastParameters):
+    def __init__(self, handle: NodeHandle, address: Address, parameters: BroadcastParameters):
         self.vehicles: list[DriverVehicle] = []
         self._dongle = address.dongle
-        self.broadcaster = Broadcaster(
-            address, self._links, parameters.repeats, parameters.repeat_period
+        #: Sender to all of them; see `radio_channel`.
+        self.radio = radio_channel(
+            handle, address, self.vehicles, parameters.repeats, parameters.repeat_period
         )
-        self._poses = PackedPoses(self.broadcaster)
         self._least_poses = parameters.poses
 
     def add(self, vehicle: DriverVehicle) -> None:
         """Add a vehicle."""
         self.vehicles.append(vehicle)
-        vehicle.status.broadcaster = self.broadcaster
+        vehicle.status.radio = self.radio
         self._share_poses()
 
     def remove(self, vehicle: DriverVehicle) -> None:
@@ -74,8 +71,8 @@ class Channel:
         self.vehicles.remove(vehicle)
         self._share_poses()
 
-    def share(self, needs: Mapping[DriverVehicle, Need]) -> SharedCommand | None:
-        """Return a command for all vehicles with the need for one; None if each gets its own.
+    def share(self, needs: Mapping[DriverVehicle, Need]) -> Any:
+        """Return a `SharedCommand` for all that need a command; None if each gets its own.
 
         A broadcast reaches every vehicle of the channel: each must be known, and must need nothing
         else.
@@ -85,9 +82,9 @@ class Channel:
         if len(ready) < 2 or any(needs.get(each) not in harmless for each in self.vehicles):
             return None
         # Older firmware has other forms of the commands.
-        if len({link.protocol for link in self._links()}) != 1:
+        if len(set(self._protocols())) != 1:
             return None
-        return SharedCommand(self.broadcaster, len(ready))
+        return self.radio.share(len(ready))
 
     def _share_poses(self):
         addresses = [vehicle.crazyflie.address for vehicle in self.vehicles]
@@ -99,19 +96,19 @@ class Channel:
             if address.dongle == self._dongle and users[address.vehicle_id] == 1
         }
         shares = 0 < self._least_poses <= len(addresses)
-        self._poses.vehicles = len(packed)
+        self.radio.pack_poses(len(packed))
         for vehicle in self.vehicles:
             vehicle_id = packed.get(vehicle)
             localization = vehicle.crazyflie.localization
             if shares and vehicle_id is not None:
-                localization.broadcast_by(self._poses, vehicle_id)
+                localization.broadcast_by(self.radio.poses, vehicle_id)
             else:
                 localization.broadcast_by(None)
 
-    def _links(self) -> Iterator[Link]:
-        for vehicle in list(self.vehicles):
+    def _protocols(self):
+        for vehicle in self.vehicles:
             with contextlib.suppress(LinkLostError):
-                yield vehicle.crazyflie.link()
+                yield vehicle.crazyflie.protocol()
 
 
 class CrazyflieServerNode(Node[CrazyflieServerParameters]):
@@ -123,8 +120,6 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
     vehicles needs just that; otherwise each vehicle gets its own. Every vehicle must answer; one
     that has not received the broadcast is sent its own command.
     """
-
-    sources = "its vehicles, by threads"
 
     needed_in_flight = True
 
@@ -157,12 +152,10 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
 
     def shutdown(self) -> None:
         """Land vehicles in the air, stop the motors of all others, disconnect from all."""
-        wait(
-            [vehicle.remove(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
-            _SHUTDOWN_LIMIT,
-        )
-        for channel in self._channels.values():
-            channel.broadcaster.close()
+        removed = [vehicle.remove(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())]
+        self._handle.outside(wait, removed, _SHUTDOWN_LIMIT)
+        for channel in list(self._channels.values()):
+            channel.radio.close()
 
     def _follow_flights(self):
         vehicles = self._vehicles.values()
@@ -203,7 +196,9 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         vehicle = DriverVehicle(self._handle, requested, self._parameters)
         self._vehicles[address.key] = vehicle
         if address.channel not in self._channels:
-            self._channels[address.channel] = Channel(address, self._parameters.broadcast)
+            self._channels[address.channel] = Channel(
+                self._handle, address, self._parameters.broadcast
+            )
         self._channels[address.channel].add(vehicle)
         vehicle.info(f"connecting to {requested.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
@@ -250,7 +245,8 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         # Started here, in the order of the calls.
         checks = {vehicle: vehicle.commands.check(command) for vehicle in ready}
         before = {vehicle: vehicle.jobs.superseded for vehicle in ready}
-        return Job(lambda _: self._send(command, channels, checks, before)).start(f"all-{name}")
+        job = Job(lambda _: self._send(command, channels, checks, before))
+        return job.start(self._handle.task, f"all-{name}")
 
     def _send(
         self,
@@ -259,7 +255,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
         checks: Mapping[DriverVehicle, Future[Need]],
         before: Mapping[DriverVehicle, tuple[int, str]],
     ) -> None:
-        needs, refusals = _results(checks, not command.ends_flight)
+        needs, refusals = self._results(checks, not command.ends_flight)
         if not command.ends_flight:
             # While others were checked, a vehicle may have been landed.
             for vehicle in needs:
@@ -276,14 +272,31 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
                 if vehicle in needs:
                     own = command.by(shared if needs[vehicle] is Need.COMMAND else None)
                     sent[vehicle] = vehicle.commands.send(own)
-        refusals.update(_results(sent, not command.ends_flight)[1])
+        refusals.update(self._results(sent, not command.ends_flight)[1])
         if refusals:
             raise ServiceError(f"{command.name}: {refusals_text(refusals, len(checks))}")
+
+    def _results(
+        self, futures: Mapping[DriverVehicle, Future[Any]], may_withdraw: bool
+    ) -> tuple[dict[DriverVehicle, Any], dict[str, str]]:
+        # Results; errors by name.
+        self._handle.outside(wait, list(futures.values()), ANSWER_LIMIT)
+        results: dict[DriverVehicle, Any] = {}
+        errors: dict[str, str] = {}
+        for vehicle, future in futures.items():
+            # A refused command must not be carried out later.
+            if future.cancel() if may_withdraw else not future.done():
+                errors[vehicle.parameters.name] = f"no answer within {ANSWER_LIMIT:g} s"
+            elif (error := future.exception()) is not None:
+                errors[vehicle.parameters.name] = str(error)
+            else:
+                results[vehicle] = future.result()
+        return results, errors
 
     def _on_emergency(self, _):
         # A broadcast reaches all at once; then each is sent its own until it has obeyed.
         for channel in self._channels.values():
-            channel.broadcaster.send(BROADCAST_STOP, urgent=True)
+            channel.radio.stop_motors()
         for vehicle in self._vehicles.values():
             try:
                 vehicle.latch_emergency()
@@ -299,7 +312,7 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
             name = address.channel
             self._channels[name].remove(vehicle)
             if not self._channels[name].vehicles:
-                self._channels.pop(name).broadcaster.close()
+                self._channels.pop(name).radio.close()
 
     def _when_done(self, done, finish, vehicle):
         # ``finish`` runs in its turn with the other callbacks, before the answer goes out.
@@ -323,21 +336,3 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
                 ],
             )
         )
-
-
-def _results(
-    futures: Mapping[DriverVehicle, Future[Any]], may_withdraw: bool
-) -> tuple[dict[DriverVehicle, Any], dict[str, str]]:
-    # Results; errors by name.
-    wait(futures.values(), ANSWER_LIMIT)
-    results: dict[DriverVehicle, Any] = {}
-    errors: dict[str, str] = {}
-    for vehicle, future in futures.items():
-        # A refused command must not be carried out later.
-        if future.cancel() if may_withdraw else not future.done():
-            errors[vehicle.parameters.name] = f"no answer within {ANSWER_LIMIT:g} s"
-        elif (error := future.exception()) is not None:
-            errors[vehicle.parameters.name] = str(error)
-        else:
-            results[vehicle] = future.result()
-    return results, errors

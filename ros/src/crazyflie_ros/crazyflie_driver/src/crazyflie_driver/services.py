@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import time
 from collections.abc import Callable, Collection
 from concurrent.futures import wait
 from dataclasses import dataclass, field
@@ -16,8 +15,7 @@ from crazyflie_driver.commands import SERVICE_TYPES, FlightState, requested
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.trajectory_messages import from_message
-from crazyflie_driver.vehicle_base import BaseVehicle, Job
-from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_driver.vehicle_base import BaseVehicle, Job, awaited
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.triggers import is_trigger
 from crazyflie_model.lights import COLOR_LED_DECKS, wrgb
@@ -62,7 +60,7 @@ class ParameterMirror:
 
     _handle: NodeHandle
     _prefix: str
-    _crazyflie: Crazyflie
+    _crazyflie: Any  # A `Crazyflie`, as an `External`.
     _on_estimate_reset: Callable[[], None] = lambda: None
     _written: dict[str, int | float] = field(default_factory=dict)
 
@@ -158,10 +156,10 @@ class ParameterMirror:
                 self._set_on_master({self._full_name(name): _portable(values[name])})
 
     def _on_master(self, name):
-        # A frozen master never answers; the thread that asks it is left behind.
+        # A frozen master never answers; the task that asks it is left behind.
         asked = Job(lambda _: self._handle.get_param(self._full_name(name), FIRMWARE_NUMBER))
         try:
-            return asked.start("ask-master").result(MASTER_LIMIT)
+            return awaited(self._handle, asked.start(self._handle.task, "ask-master"), MASTER_LIMIT)
         except TimeoutError:
             raise TimeoutError(
                 f"the ROS master has not told the parameter {self._full_name(name)} within "
@@ -170,7 +168,8 @@ class ParameterMirror:
 
     def _set_on_master(self, values):
         later = self._handle.set_param_later
-        wait([later(name, value) for name, value in values.items()], MASTER_LIMIT)
+        done = [later(name, value) for name, value in values.items()]
+        self._handle.outside(wait, done, MASTER_LIMIT)
 
     def _full_name(self, name):
         return f"{self._prefix}/{name.replace('.', '/')}"
@@ -216,18 +215,18 @@ class VehicleServices:
         vehicle = self._vehicle
         prefix = vehicle.parameters.prefix
         values = vehicle.handle.get_param(prefix or "/", _NAMESPACE, {})
-        awaited = {
+        controllers = {
             (f"{prefix}/{name}", service)
             for name, below in values.items()
             if isinstance(below, dict) and "PIDs" in below
             for service in _SHARED
         }
-        end = time.monotonic() + CONTROLLER_LIMIT
-        while awaited and not vehicle.is_closing() and time.monotonic() < end:
+        end = vehicle.monotonic() + CONTROLLER_LIMIT
+        while controllers and not vehicle.is_closing() and vehicle.monotonic() < end:
             nodes = vehicle.handle.service_nodes()
-            awaited -= {(node, name.rpartition("/")[2]) for name, node in nodes.items()}
-            if awaited:
-                time.sleep(CONTROLLER_PERIOD)
+            controllers -= {(node, name.rpartition("/")[2]) for name, node in nodes.items()}
+            if controllers:
+                vehicle.sleep(CONTROLLER_PERIOD)
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has, below `ASIDE` what is another node's; blocks."""

@@ -1,10 +1,7 @@
 """Blocks of a stream of setpoints: of a new vehicle, after a lost link, and others."""
 
-import contextlib
 import enum
 import math
-import threading
-from collections.abc import Iterator
 
 from crazyflie_model.limits import OFF_AGE
 
@@ -119,11 +116,10 @@ class SetpointGate:
     disarmed, or whose link was lost, until it reports a flight. A call opens it for setpoints that
     take over a vehicle that flies.
 
-    Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
+    Everything is in turn with callbacks, but for a look at `is_emergency`.
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
         self._blocks = _ADDED
         self._commands = 0
         # When setpoints could come first, when the latest one came, and of which kind it was.
@@ -139,10 +135,9 @@ class SetpointGate:
 
     def handle(self, event: GateEvent) -> None:
         """Change the blocks as an event does."""
-        with self._lock:
-            for each, needed, begun, ended in TRANSITIONS:
-                if each is event and (not needed or needed & self._blocks):
-                    self._blocks = self._blocks & ~ended | begun
+        for each, needed, begun, ended in TRANSITIONS:
+            if each is event and (not needed or needed & self._blocks):
+                self._blocks = self._blocks & ~ended | begun
 
     def listen(self, now: float) -> None:
         """Record that setpoints are subscribed to."""
@@ -150,33 +145,22 @@ class SetpointGate:
 
     def high_level(self, now: float) -> int:
         """Begin the overlap of a high-level command; return the number of the command."""
-        with self._lock:
-            self._high_level_since = now
-            self._commands += 1
-            return self._commands
+        self._high_level_since = now
+        self._commands += 1
+        return self._commands
 
     def resume(self, command: int) -> None:
         """Allow setpoints again after a command (its number) failed, unless one has followed."""
-        with self._lock:
-            if command == self._commands:
-                self._high_level_since = None
+        if command == self._commands:
+            self._high_level_since = None
 
     def stop(self, now: float) -> None:
         """Begin the overlap of cmd_stop, which ends a stream."""
-        with self._lock:
-            self._stopped_since = now
+        self._stopped_since = now
 
-    @contextlib.contextmanager
-    def passing(self, now: float, control: Control) -> Iterator[str]:
-        """Yield the `refusal` of a setpoint sent within the block; nothing changes meanwhile."""
-        with self._lock:
-            yield self.refusal(now, control)
-
-    @contextlib.contextmanager
-    def repeating(self, now: float) -> Iterator[str]:
-        """Do the same for a setpoint of the driver's own: it is no part of a stream."""
-        with self._lock:
-            yield self._reason(now, False)
+    def refusal_of_repetition(self, now: float) -> str:
+        """Return the `refusal` of a setpoint of the driver's own: it is no part of a stream."""
+        return self._reason(now, False)
 
     def is_blocking(self, now: float) -> bool:
         """Return whether a stream from before a loss of the link, or an adding, is blocked."""
@@ -188,9 +172,8 @@ class SetpointGate:
 
         The firmware obeys the latest setpoint for `OFF_AGE`. One that was blocked counts, too.
         """
-        with self._lock:
-            if self._control is Control.ZERO_THRUST or now - self._latest > OFF_AGE:
-                return ""
+        if self._control is Control.ZERO_THRUST or now - self._latest > OFF_AGE:
+            return ""
         return (
             "setpoints come that would start its motors at once: end them (call /land if a "
             f"takeoff server sends them), and arm it after zero thrust, or {OFF_AGE:g} s later"
@@ -199,15 +182,14 @@ class SetpointGate:
     def refusal(self, now: float, control: Control) -> str:
         """Return why a setpoint must not be sent; empty if it may."""
         is_zero = control is Control.ZERO_THRUST
-        with self._lock:
-            has_paused = now - max(self._begin, self._latest) > STREAM_PAUSE
-            self._latest, self._control = now, control
-            # References do not make a vehicle leap.
-            if is_zero or (has_paused and control is Control.REFERENCE):
-                self.handle(GateEvent.GROUND_COMMANDED)
-            if (is_zero or has_paused) and not self._blocks & ~(_ON_TRIAL | _ADDED):
-                self.handle(GateEvent.STREAM_BEGUN)
-            return self._reason(now, is_zero)
+        has_paused = now - max(self._begin, self._latest) > STREAM_PAUSE
+        self._latest, self._control = now, control
+        # References do not make a vehicle leap.
+        if is_zero or (has_paused and control is Control.REFERENCE):
+            self.handle(GateEvent.GROUND_COMMANDED)
+        if (is_zero or has_paused) and not self._blocks & ~(_ON_TRIAL | _ADDED):
+            self.handle(GateEvent.STREAM_BEGUN)
+        return self._reason(now, is_zero)
 
     def _reason(self, now, is_zero):
         for block, reason in REASONS.items():

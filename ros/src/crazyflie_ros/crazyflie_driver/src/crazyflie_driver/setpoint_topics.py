@@ -17,7 +17,6 @@ from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import Control, GateEvent
 from crazyflie_driver.thrust_fade import FADE_TIME, ThrustFade
 from crazyflie_driver.vehicle_base import BaseVehicle
-from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_model.limits import LEVEL_AGE, MAX_SETPOINT_PWM, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
@@ -42,7 +41,7 @@ class Sender(NamedTuple):
     """
 
     message_type: type
-    send: Callable[[Crazyflie, Any], None]
+    send: Callable[[Any, Any], None]
     height_and_yaw: Callable[[Any], tuple[float | None, float | None]] = lambda _: (None, None)
 
 
@@ -50,7 +49,7 @@ class ExternalSender(NamedTuple):
     """The same of a topic with measured positions; ``position(message)`` returns one, m."""
 
     message_type: type
-    send: Callable[[Crazyflie, Any], None]
+    send: Callable[[Any, Any], None]
     position: Callable[[Any], tuple[float, float, float]]
 
 
@@ -228,14 +227,18 @@ class SetpointTopics:
         else:
             self.send_zero_thrust()
 
-    def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
+    def notify_setpoints_stop(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints stop, so that the vehicle accepts high-level commands.
 
-        The last setpoint remains valid for some ms. At once means in the calling thread, which has
-        to be the one that sends: see `Subsystem.guarded`.
+        The last setpoint remains valid for some ms.
         """
-        self._vehicle.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
+        self._vehicle.crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms)
         self._setpoints_stopped()
+
+    def was_notified(self, moment: float) -> None:
+        """Record that it was announced at a time (s), unless setpoints have come since."""
+        if self.last_time <= moment:
+            self._setpoints_stopped()
 
     def _setpoints_stopped(self):
         self.control = Control.HIGH_LEVEL
@@ -313,17 +316,17 @@ class SetpointTopics:
         height, yaw = sender.height_and_yaw(message)
         if height is not None and height < MIN_CLIMB:
             gate.handle(GateEvent.GROUND_COMMANDED)
-        with gate.passing(now, control) as refusal:
-            key = "gate" if refusal else "estimate"
-            refusal = refusal or self._wrong_estimate(name)
-            is_sent = not refusal and self._send(name, sender, message)
-            if is_sent:
-                if name == CMD_STOP:
-                    gate.stop(now)
-                self._times.append(now)
-                if name == CMD_VEL:
-                    self._fade.command(now, _thrust(message))
-                self.control, self._topic = control, name
+        refusal = gate.refusal(now, control)
+        key = "gate" if refusal else "estimate"
+        refusal = refusal or self._wrong_estimate(name)
+        is_sent = not refusal and self._send(name, sender, message)
+        if is_sent:
+            if name == CMD_STOP:
+                gate.stop(now)
+            self._times.append(now)
+            if name == CMD_VEL:
+                self._fade.command(now, _thrust(message))
+            self.control, self._topic = control, name
         if refusal:
             self._warn(f"ignoring {name}: {refusal}", key=key)
         if not is_sent:
@@ -366,20 +369,17 @@ class SetpointTopics:
 
     def _repeat_notice(self, now):
         # A vehicle that has lost it would be locked.
-        with self._vehicle.gate.repeating(now) as refusal:
-            if not refusal and now - self._end_time >= _REST:
-                self._vehicle.crazyflie.setpoints.notify_setpoints_stop()
-                self._end_time = now
+        is_refused = self._vehicle.gate.refusal_of_repetition(now)
+        if not is_refused and now - self._end_time >= _REST:
+            self._vehicle.crazyflie.setpoints.notify_setpoints_stop()
+            self._end_time = now
 
     def _send_fading(self, now):
         thrust = self._fade.thrust(now)
-        if thrust is None:
+        if thrust is None or self._vehicle.gate.refusal_of_repetition(now):
             return
-        with self._vehicle.gate.repeating(now) as refusal:
-            if refusal:
-                return
-            self._cmd_vel(Twist(linear=Vector3(z=thrust)))
-            self._faded_time = now
+        self._cmd_vel(Twist(linear=Vector3(z=thrust)))
+        self._faded_time = now
         self._vehicle.warn(
             f"{CMD_VEL} has stopped in flight: the vehicle is kept level with a thrust that fades "
             f"for {FADE_TIME:g} s; {OFF_AGE:g} s later it stops its motors",

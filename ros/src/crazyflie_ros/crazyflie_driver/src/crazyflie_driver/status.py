@@ -3,6 +3,7 @@
 import contextlib
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Bool, Header, String
@@ -17,7 +18,6 @@ from crazyflie_driver.parameters import (
 )
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle
-from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_model.supervisor import SupervisorState
@@ -154,8 +154,7 @@ class StatusPublisher:
     _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
-    #: Sender to all vehicles of its channel, which counts broadcasts.
-    broadcaster: Broadcaster | None = None
+    radio: Any = None  #: Sender to all vehicles of its channel; see `radio_channel`.
     # Counts of received and sent broadcasts, received and sent unicasts; and in the last period.
     _counts: tuple[int, ...] = (0, 0, 0, 0)
     _in_period: tuple[int, ...] = (0, 0, 0, 0)
@@ -225,8 +224,8 @@ class StatusPublisher:
             self._connected.publish(Bool(is_connected))
 
     def _count_packets(self):
-        log, broadcaster = self._log, self.broadcaster
-        sent = 0 if broadcaster is None else broadcaster.sent
+        log = self._log
+        sent = 0 if self.radio is None else self.radio.sent
         counts = (
             log.received_broadcasts,
             sent,

@@ -1,9 +1,7 @@
 """One vehicle of the server: its link, topics and services, from adding to removing."""
 
 import dataclasses
-import threading
-import time
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 
 from crazyflie_driver.commands import FlightState
 from crazyflie_driver.flight_commands import FlightCommands, Reason
@@ -25,8 +23,10 @@ from crazyflie_driver.vehicle_base import (
     Delivery,
     Job,
     Jobs,
+    awaited,
 )
-from crazyflie_link.crazyflie import Crazyflie, LinkState
+from crazyflie_driver.vehicle_link import vehicle_link
+from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.transmission import REPLY_LIMIT
 from crazyflie_model.supervisor import SupervisorState
@@ -51,6 +51,8 @@ class DriverVehicle(BaseVehicle):
     `CrazyflieError` if the address is malformed.
     """
 
+    log: LogTopics
+
     def __init__(
         self, handle: NodeHandle, parameters: VehicleParameters, server: CrazyflieServerParameters
     ):
@@ -59,18 +61,20 @@ class DriverVehicle(BaseVehicle):
             own,
             parameters,
             server,
-            Crazyflie(
+            vehicle_link(
+                own,
+                name,
                 parameters.uri,
-                reconnect=True,
-                on_state=self._on_link_state,
+                on_state=lambda state, text: self._pass_link_state(state, text),
                 on_console=self.info,
                 on_packet=lambda *packet: self.log.publish_packet(*packet),
             ),
             SetpointGate(),
-            Jobs(name, self.error),
+            Jobs(name, own.task, self.error),
             Delivery(own, name),
             link_text=f"connecting to {parameters.uri}",
         )
+        self._deliver_link_state = self.delivery.outlet(self._on_link_state)
         self.log = LogTopics(self, self._on_log)
         self.setpoints = SetpointTopics(self, self.log)
         self.flight = FlightState(self, self.log, self.setpoints)
@@ -82,8 +86,8 @@ class DriverVehicle(BaseVehicle):
         self._services = VehicleServices(
             self, self.flight, self.commands, self._mirror, self.latch_emergency
         )
-        # Held while topics and services are announced, or taken down.
-        self._announcing = threading.Lock()
+        # Done once topics and services are announced, or have failed to be.
+        self._announcing: Future[None] | None = None
         # Number of the link on which the vehicle was set up last.
         self._connection_count = 0
         self.status.publish()
@@ -118,9 +122,10 @@ class DriverVehicle(BaseVehicle):
         self.status.publish()
         self.gate.handle(GateEvent.REMOVAL)
         self.jobs.supersede("the removal")
-        return Job(lambda _: self._remove(limit)).start(f"{self.parameters.name}-close")
+        removal = Job(lambda _: self._remove(limit))
+        return removal.start(self.handle.task, f"{self.parameters.name}-close")
 
-    # Connecting and the end, in threads that may block.
+    # Connecting and the end, in tasks.
 
     def _connect(self, _: Job) -> None:
         try:
@@ -128,23 +133,29 @@ class DriverVehicle(BaseVehicle):
             self.transition(ConnectionEvent.LINK_OPENED)
             self._choose_positioning()
             self._services.wait_for_controllers()
-            with self._announcing:
-                if self.is_closing():
-                    raise ServiceError("removed while connecting")
-                self.log.start()
-                self._set_up()
-                self._services.advertise()
-                self.setpoints.subscribe()
-                self.commands.start()
-                self.transition(ConnectionEvent.ANNOUNCED)
-                # A new link may have come meanwhile.
-                self._take_up_link()
-        except BaseException:
+            if self.is_closing():
+                raise ServiceError("removed while connecting")
+            self._announce()
+        except Exception:
             self.transition(ConnectionEvent.REMOVAL)
             self._end()
             raise
-        self.delivery.submit(self.status.publish)
+        self.status.publish()
         self.info(f"connected to {self.parameters.uri}")
+
+    def _announce(self):
+        self._announcing = Future()
+        try:
+            self.log.start()
+            self._set_up()
+            self._services.advertise()
+            self.setpoints.subscribe()
+            self.commands.start()
+            self.transition(ConnectionEvent.ANNOUNCED)
+            # A new link may have come meanwhile.
+            self._take_up_link()
+        finally:
+            self._announcing.set_result(None)
 
     def _choose_positioning(self):
         name = f"{self.parameters.prefix}/{POSITIONING_PARAMETER}"
@@ -206,8 +217,9 @@ class DriverVehicle(BaseVehicle):
     def _end(self):
         # First the link: its end ends the wait for answers in `_connect`.
         self.crazyflie.close()
-        with self._announcing:
-            self.handle.close()
+        if self._announcing is not None:
+            self.handle.outside(wait, [self._announcing])
+        self.handle.close()
         self.delivery.close()
         self.jobs.close()
         self.transition(ConnectionEvent.REMOVED)
@@ -241,8 +253,8 @@ class DriverVehicle(BaseVehicle):
         is_flying = SupervisorState.FLYING in state
         on_setpoints = is_flying and setpoints.runs_motors and setpoints.can_land_autonomously()
         if self.flight.is_high_level(state) or on_setpoints:
-            end = time.monotonic() + limit
-            self.commands.land(Reason.REMOVAL).result(REPLY_LIMIT + limit)
+            end = self.monotonic() + limit
+            awaited(self.handle, self.commands.land(Reason.REMOVAL), REPLY_LIMIT + limit)
             if not self._has_landed(end):
                 return
         elif is_flying and not setpoints.is_streaming:
@@ -253,21 +265,24 @@ class DriverVehicle(BaseVehicle):
         setpoints.send_zero_thrust()
 
     def _has_landed(self, end):
-        time.sleep(min(_REACTION_TIME, max(0.0, end - time.monotonic())))
+        self.sleep(min(_REACTION_TIME, max(0.0, end - self.monotonic())))
         while True:
             state = self.flight.read()
             # FLYING alone holds until 2 s after the motors have stopped.
             if state is not None and not self.flight.has_taken_off(state):
                 return True
-            if time.monotonic() > end:
+            if self.monotonic() > end:
                 return False
-            time.sleep(_LOOK_PERIOD)
+            self.sleep(_LOOK_PERIOD)
 
-    # Events of the link, in its own threads, where nothing may wait for the callbacks' turn: at the
-    # end the node waits for the end of the link.
+    def _pass_link_state(self, state: LinkState, text: str) -> None:
+        # From the link's threads.
+        self._deliver_link_state(state.value, text)
 
-    def _on_link_state(self, state: LinkState, text: str) -> None:
-        self.link_text = text
+    # In turn with the callbacks of the node.
+
+    def _on_link_state(self, value: str, text: str) -> None:
+        state, self.link_text = LinkState(value), text
         if state is LinkState.LOST:
             self.log.forget_state()
             self.gate.handle(GateEvent.LINK_LOST)
@@ -276,15 +291,13 @@ class DriverVehicle(BaseVehicle):
             self.gate.handle(GateEvent.LINK_BACK)
             self._take_up_link()
         if not self.is_closing():
-            self.delivery.submit(self._report, state, text)
+            self._report(state, text)
 
     def _take_up_link(self):
         is_known = self.crazyflie.connection_count == self._connection_count
         event = ConnectionEvent.LINK_HEARD if is_known else ConnectionEvent.LINK_RENEWED
         if self.transition(event) is ConnectionState.RESUMING:
             self.jobs.submit("taking up the link again", self._resume)
-
-    # In turn with the callbacks of the node.
 
     def _report(self, state, text):
         self.status.publish()

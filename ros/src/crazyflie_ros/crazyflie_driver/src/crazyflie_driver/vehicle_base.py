@@ -1,21 +1,24 @@
-"""What the parts of one vehicle share: the states of its connection, its data and its threads.
+"""What the parts of one vehicle share: the states of its connection, its data and its jobs.
 
-The threads are those of its jobs, which wait for the vehicle, and of the delivery of its data.
+Jobs are tasks, in turn with callbacks, which wait for the vehicle; the thread of the delivery
+brings its data in turn.
 """
 
 import contextlib
 import enum
+import math
 import queue
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, InvalidStateError
+from concurrent.futures import Future, InvalidStateError, wait
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
 from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.setpoint_gate import SetpointGate
-from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.topics import Publisher
@@ -28,6 +31,34 @@ MOST_JOBS = 64
 MAX_WAITING = 1000
 
 _UNANSWERED = LinkLostError, NoReplyError
+
+StartTask = Callable[[str, Callable[[], None]], None]  #: See `NodeHandle.task`.
+
+
+def awaited(handle: NodeHandle, future: Future[Result], limit: float) -> Result:
+    """Return the result of a future; a task waits for it, at most ``limit`` s (TimeoutError)."""
+    handle.outside(wait, [future], limit)
+    return future.result(0.0)
+
+
+class News:
+    """Something new, which tasks wait for."""
+
+    def __init__(self, handle: NodeHandle):
+        self._handle = handle
+        self._awaited: list[threading.Event] = []
+
+    def wait(self, limit: float) -> bool:
+        """Wait in a task for the next `tell`, at most ``limit`` s; return whether it came."""
+        has_come = threading.Event()
+        self._awaited.append(has_come)
+        self._handle.outside(has_come.wait, limit)
+        return has_come.is_set()
+
+    def tell(self) -> None:
+        """Let all go on that wait."""
+        while self._awaited:
+            self._awaited.pop().set()
 
 
 @dataclass(eq=False)
@@ -55,9 +86,9 @@ class Job:
         """Return why it may not send."""
         return f"given up for {self.superseded_by or 'its caller, who waits no longer'}"
 
-    def start(self, name: str) -> Future[Any]:
-        """Do the job in a thread of its own with a name; return the future of its result."""
-        threading.Thread(target=self.run, name=name, daemon=True).start()
+    def start(self, start: StartTask, name: str) -> Future[Any]:
+        """Do the job as a task of its own with a name; return the future of its result."""
+        start(name, self.run)
         return self.done
 
     def run(self) -> None:
@@ -68,29 +99,48 @@ class Job:
             try:
                 self.check()
                 self.done.set_result(self.work(self))
-            except BaseException as error:
+            except Exception as error:
                 self.done.set_exception(error)
 
 
+class _Lane:
+    """Jobs that are done one after the other, by a task that lasts while there are any."""
+
+    def __init__(self, start: StartTask, name: str):
+        self.waiting: deque[Job] = deque()
+        self._start, self._name = start, name
+        self._is_running = False
+
+    def put(self, job: Job) -> None:
+        """Queue a job."""
+        self.waiting.append(job)
+        if not self._is_running:
+            self._is_running = True
+            self._start(self._name, self._run)
+
+    def _run(self):
+        while self.waiting:
+            self.waiting.popleft().run()
+        self._is_running = False
+
+
 class Jobs:
-    """A queue with a lane for urgent jobs; a thread for each lane does its jobs in their order.
+    """A queue with a lane for urgent jobs; a task for each lane does its jobs in their order.
 
     Urgent jobs supersede every flight job that was submitted before them: one that has not begun is
-    given up, a running one is marked. When a job fails, ``on_error(text)`` is called in its thread.
+    given up, a running one is marked. When a job fails, ``on_error(text)`` is called. Everything
+    is used in turn with callbacks; ``start`` starts a task.
     """
 
-    def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
+    def __init__(
+        self, name: str, start: StartTask, on_error: Callable[[str], None] = lambda text: None
+    ):
         self._on_error = on_error
         #: How often flight jobs were superseded, and by what at last.
         self.superseded: tuple[int, str] = 0, ""
-        self._lock = threading.Lock()
-        # A lane ends with None.
-        self._lane: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._urgent_lane: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._lane, self._urgent_lane = _Lane(start, name), _Lane(start, f"{name}-urgent")
         self._flights: list[Job] = []
         self._is_closed = False
-        for lane, each in ((self._lane, name), (self._urgent_lane, f"{name}-urgent")):
-            threading.Thread(target=self._run, args=(lane,), name=each, daemon=True).start()
 
     def submit(
         self,
@@ -123,16 +173,15 @@ class Jobs:
             self.supersede(what)
         job = Job(run)
         lane = self._urgent_lane if urgent else self._lane
-        with self._lock:
-            if self._is_closed:
-                job.done.set_exception(ServiceError("the vehicle has been removed"))
-            elif lane.qsize() >= MOST_JOBS:
-                job.done.set_exception(ServiceError(f"{MOST_JOBS} calls wait for the vehicle"))
-            else:
-                lane.put(job)
-                if is_flight and not urgent:
-                    self._flights = [each for each in self._flights if not each.done.done()]
-                    self._flights.append(job)
+        if self._is_closed:
+            job.done.set_exception(ServiceError("the vehicle has been removed"))
+        elif len(lane.waiting) >= MOST_JOBS:
+            job.done.set_exception(ServiceError(f"{MOST_JOBS} calls wait for the vehicle"))
+        else:
+            lane.put(job)
+            if is_flight and not urgent:
+                self._flights = [each for each in self._flights if not each.done.done()]
+                self._flights.append(job)
         return job.done
 
     def supersede(self, what: str) -> None:
@@ -141,9 +190,8 @@ class Jobs:
         Callers of those that have not begun are told at once. A running one may be carried out
         already, which its end tells.
         """
-        with self._lock:
-            flights, self._flights = self._flights, []
-            self.superseded = self.superseded[0] + 1, what
+        flights, self._flights = self._flights, []
+        self.superseded = self.superseded[0] + 1, what
         for job in flights:
             job.superseded_by = what
             if not job.is_begun:
@@ -151,47 +199,52 @@ class Jobs:
                 job.run()
 
     def close(self) -> None:
-        """Take no more jobs; the threads end once the queue is empty."""
-        with self._lock:
-            self._is_closed = True
-        self._lane.put(None)
-        self._urgent_lane.put(None)
-
-    def _run(self, lane):
-        while (job := lane.get()) is not None:
-            job.run()
+        """Take no more jobs; those that wait are done."""
+        self._is_closed = True
 
 
 class Delivery:
     """A thread through which a link's threads call the node's callbacks without blocking.
 
-    `NodeHandle.submit` returns when a callback has run, and that waits for all callbacks before it.
-    A link whose thread blocks on that receives nothing meanwhile.
+    A function of `NodeHandle.input` returns when its callback has run, and that waits for all
+    callbacks before it. A link whose thread blocks on that receives nothing meanwhile.
     """
 
     def __init__(self, handle: NodeHandle, name: str):
-        self._handle = handle
-        self._queue: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._callbacks: list[Callable[..., None]] = []
+        self._pass_on = handle.input(self._call)
+        self._queue: queue.SimpleQueue[tuple[int, tuple[Any, ...]]] = queue.SimpleQueue()
         self._is_closed = False
-        threading.Thread(target=self._run, name=f"{name}-delivery", daemon=True).start()
+        thread = threading.Thread(target=self._run, name=f"{name}-delivery", daemon=True)
+        handle.start(thread.start)
 
-    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
-        """Call ``callback(*arguments)`` in turn with the node's callbacks; does not block."""
-        self._queue.put(partial(callback, *arguments))
+    def outlet(self, callback: Callable[..., None], are_data: bool = False) -> Callable[..., None]:
+        """Return a function for threads that calls the callback in turn, and does not block.
 
-    def submit_data(self, callback: Callable[..., None], *arguments: Any) -> None:
-        """Do the same with data, which are dropped when too many wait."""
-        if self._queue.qsize() < MAX_WAITING:
-            self.submit(callback, *arguments)
+        Its arguments must be JSON. Data are dropped when too many wait.
+        """
+        self._callbacks.append(callback)
+        most = MAX_WAITING if are_data else math.inf
+        return partial(self._put, len(self._callbacks) - 1, most)
 
     def close(self) -> None:
         """Stop calling; discard the queue."""
         self._is_closed = True
-        self._queue.put(lambda: None)
+        self._queue.put((0, ()))
+
+    def _put(self, number, most, *arguments):
+        if self._queue.qsize() < most:
+            self._queue.put((number, arguments))
 
     def _run(self):
         while not self._is_closed:
-            self._handle.submit(self._queue.get())
+            self._pass_on(self._queue.get())
+
+    def _call(self, known):
+        number, arguments = known
+        # In turn with `close`, which puts what is none.
+        if not self._is_closed:
+            self._callbacks[number](*arguments)
 
 
 class ConnectionState(enum.Enum):
@@ -245,26 +298,33 @@ TRANSITIONS: dict[tuple[ConnectionState, ConnectionEvent], ConnectionState] = {
 class BaseVehicle:
     """Common data of all parts of one vehicle, which are attributes of `DriverVehicle`.
 
-    The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs. All
-    threads of the vehicle use its state; ``link_text`` says why the link is in its own.
+    The handle is closed when the vehicle is removed. Calls that block on the vehicle are jobs.
+    ``crazyflie`` is a `Crazyflie` as an `External`; ``link_text`` says why the link is in its
+    state.
     """
 
     handle: NodeHandle
     parameters: VehicleParameters
     server: CrazyflieServerParameters
-    crazyflie: Crazyflie
+    crazyflie: Any
     gate: SetpointGate
     jobs: Jobs
     delivery: Delivery
     link_text: str
     state: ConnectionState = ConnectionState.CONNECTING
-    _state_lock: threading.Lock = field(default_factory=threading.Lock)
 
     def transition(self, event: ConnectionEvent) -> ConnectionState:
         """Change the state by an event, and return it."""
-        with self._state_lock:
-            self.state = TRANSITIONS.get((self.state, event), self.state)
-            return self.state
+        self.state = TRANSITIONS.get((self.state, event), self.state)
+        return self.state
+
+    def monotonic(self) -> float:
+        """Return the machine's time, s, for time limits of tasks."""
+        return float(self.handle.value("time", time.monotonic))
+
+    def sleep(self, duration: float) -> None:
+        """Wait in a task, s."""
+        self.handle.outside(time.sleep, duration)
 
     def is_ready(self) -> bool:
         """Return whether topics and services exist; also while the link is lost."""

@@ -242,6 +242,10 @@ class Crazyflie:
         """Send a CRTP packet with at most 30 bytes of data."""
         self.link().send(port, channel, data)
 
+    def protocol(self) -> int:
+        """Return the version of the protocol that the vehicle speaks."""
+        return self.link().protocol
+
     def latency(self) -> float:
         """Return the 95th percentile of the round-trip times of the latest pings, s."""
         return float(self.link().cflib.link_statistics.latency.latency) / 1000.0

@@ -73,6 +73,7 @@ class Kind(enum.IntEnum):
     SHUTDOWN = 8  #: The process ends.
     CLOCK = 9  #: A clock of a `FakeProcess` is set. 0: its own, 1: the machine's; f64: s.
     LAUNCH = 10  #: A node of an `OfflineProcess` is initialized. JSON: name, class.
+    TASK = 11  #: A task of `Tasks` begins or goes on. Task.
     # What was read.
     TIME = 20  #: The clock was read before the process began. u64: ns.
     #: Wall clock minus machine's clock has changed. 1: as a callback reads it; i64: ns.

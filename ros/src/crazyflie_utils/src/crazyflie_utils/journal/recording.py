@@ -14,13 +14,14 @@ import json
 import struct
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
+from enum import Enum
 from functools import partial
 from itertools import count
 from threading import get_ident
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 from weakref import WeakSet
 
@@ -43,6 +44,7 @@ from crazyflie_utils.topics import (
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
 _LOOK_PERIOD = 10_000  #: Period of such looks at inputs (us).
+NO_ERRORS: Mapping[str, type[Exception]] = MappingProxyType({})
 _CHECKED_TOGETHER = 64  #: Number of messages that are checked together.
 
 # Plain numbers: those of an enumeration take longer to pack.
@@ -224,6 +226,10 @@ class Recorder:
 
         self.executor.post(run)
 
+    def task(self, number: int) -> None:
+        """Write that a task goes on, in its turn."""
+        self.input(Kind.TASK, number % 0x10000)
+
     def post(self, kind: str, work: Callable[[], None]) -> None:
         """Do work as an input of a `Kind`, by its name."""
 
@@ -300,19 +306,26 @@ class Recorder:
         else:
             self.executor.enqueue(write)
 
-    def value(self, what: str, read: Callable[[], Any]) -> Any:
-        """Return what is read, and write it."""
+    def value(
+        self, what: str, read: Callable[[], Any], errors: Mapping[str, type[Exception]] = NO_ERRORS
+    ) -> Any:
+        """Return what is read, and write it; ``errors`` are known by their names, too."""
         if not self.executor.is_in_turn:
             return read()
         try:
             value = read()
         except Exception as error:
             kind = type(error).__name__
-            kind = kind if hasattr(builtins, kind) or kind == "ServiceError" else "OSError"
+            is_known = hasattr(builtins, kind) or kind == "ServiceError" or kind in errors
+            kind = kind if is_known else "OSError"
             self.row(Kind.VALUE, 0, 0, json.dumps([what, False, kind, str(error)]).encode())
             raise
-        self.row(Kind.VALUE, 0, 0, json.dumps([what, True, value], default=str).encode())
+        self.row(Kind.VALUE, 0, 0, json.dumps([what, True, value], default=_plain).encode())
         return value
+
+
+def _plain(value):
+    return value.value if isinstance(value, Enum) else str(value)
 
 
 _recorders: WeakSet[Recorder] = WeakSet()
@@ -368,12 +381,6 @@ class _RecordedSubscriber(ExternalSubscriber):
         self._post(self._pass_on, message)
 
     def _pass_on(self, message):
-        data, message = self._written(message)
-        self._recorder.input(_MESSAGE, self._number, data)
-        self._deliver(message)
-
-    def _written(self, message):
-        """Return the data of a message, and the message as a replay reads it from them."""
         header = getattr(message, "_connection_header", None)
         # Most messages come by the same connection, and share its header.
         if header is not self._header:
@@ -388,7 +395,9 @@ class _RecordedSubscriber(ExternalSubscriber):
             message._connection_header = header
         if kind is self._plain_type:
             origin = ORIGIN.pack(ORIGIN.unpack(origin)[0] | PLAIN)
-        return origin + data, message
+        self._recorder.input(_MESSAGE, self._number, origin + data)
+        # As a replay reads it.
+        self._deliver(message)
 
     def has_publishers(self) -> bool:
         return self.flag()
@@ -445,9 +454,10 @@ class RecordingTransport(Transport):
 
     def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
         """Announce a topic."""
-        external: Any = self._transport.advertise(topic, message_type, latch)
+        # A task may give up its turn for it: the next number is taken before.
         number = next(self._publishers)
         self._recorder.name(Kind.ADVERTISED, number, topic, message_type._type)
+        external: Any = self._transport.advertise(topic, message_type, latch)
         # Called for each message: not a class around the other.
         recorded: Any = SimpleNamespace(
             note=partial(self._recorder.published, number),

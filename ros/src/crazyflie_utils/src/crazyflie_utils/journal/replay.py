@@ -5,7 +5,9 @@ import collections
 import json
 import math
 import struct
-from collections.abc import Callable, Iterable, Iterator
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from queue import SimpleQueue
 from typing import Any
 
 from typing_extensions import override
@@ -21,8 +23,10 @@ from crazyflie_utils.journal.journal_file import (
     Row,
     SourcesError,
 )
+from crazyflie_utils.journal.recording import NO_ERRORS
 from crazyflie_utils.journal.replay_transport import (
     DifferenceError,
+    EndError,
     ReplayTransport,
     Rows,
 )
@@ -30,8 +34,8 @@ from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.program import load
 from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.tasks import Tasks
 from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQueue
-from crazyflie_utils.topics import Transport
 
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 
@@ -82,6 +86,65 @@ class _ReplayExecutor(Executor):
         work()
 
 
+class _ReplayTasks(Tasks):
+    """Tasks that go on when the journal says so; what they wait for is in it."""
+
+    def __init__(self, executor: Executor):
+        super().__init__(executor)
+        self._batons: dict[int, SimpleQueue[bool]] = {}
+        self._back: SimpleQueue[BaseException | None] = SimpleQueue()
+
+    @override
+    def start(self, name: str, work: Callable[[], None]) -> None:
+        number = next(self._numbers) % 0x10000
+        self._batons[number] = SimpleQueue()
+        threading.Thread(target=self._run, args=(number, work), name=name, daemon=True).start()
+
+    @override
+    def outside(self, call: Any, *arguments: Any) -> Any:
+        number = getattr(self._own, "number", None)
+        if number is not None:
+            self._back.put(None)
+            self._take_turn(number)
+
+    def go_on(self, number: int) -> None:
+        """Let a task go on until it waits again, or ends; raise what ends the replay."""
+        baton = self._batons.get(number)
+        if baton is None:
+            raise DifferenceError(f"then task {number} went on, which does not wait now")
+        runner = self._executor._runner
+        baton.put(True)
+        error = self._back.get()
+        self._executor._runner = runner
+        if error is not None:
+            raise error
+
+    def end(self) -> None:
+        """End the threads of all that wait."""
+        for baton in list(self._batons.values()):
+            baton.put(False)
+
+    @override
+    def _run(self, number, work):
+        try:
+            self._take_turn(number)
+            work()
+        # Those that are not of nodes.
+        except BaseException as error:
+            outcome: BaseException | None = error
+        else:
+            outcome = None
+        if self._batons.pop(number, None) is not None:
+            self._back.put(outcome)
+
+    @override
+    def _take_turn(self, number):
+        if not self._batons[number].get():
+            del self._batons[number]
+            raise EndError
+        self._own.number, self._executor._runner = number, threading.get_ident()
+
+
 class _ReplayClock(SteadyClock):
     """The machine's clock of then."""
 
@@ -109,12 +172,34 @@ class _ReplayClock(SteadyClock):
         return (now if moment is None else round(moment * 1e9)) + self.wall_offset
 
 
-class _RosProcess(Process):
-    """A process that was one with ROS."""
+class _ReplayProcess(Process):
+    """What comes from outside is in the journal."""
 
     is_replay = True
+    transport: ReplayTransport
+    tasks: _ReplayTasks
 
-    def __init__(self, transport: Transport, clock: str, executor: Executor, rows: Rows):
+    @override
+    def _make_tasks(self):
+        return _ReplayTasks(self.executor)
+
+    @override
+    def value(
+        self,
+        what: str,
+        read: Callable[[], Any],
+        waits: bool = False,
+        errors: Mapping[str, type[Exception]] = NO_ERRORS,
+    ) -> Any:
+        if waits:
+            self.tasks.outside(read)
+        return self.transport.value(what, f"reads {what}", errors)
+
+
+class _RosProcess(_ReplayProcess):
+    """A process that was one with ROS."""
+
+    def __init__(self, transport: ReplayTransport, clock: str, executor: Executor, rows: Rows):
         self.machine = _ReplayClock(rows, executor)
         simulated = SimulatedClock() if clock == "simulated" else self.machine
         super().__init__(transport, clock == "simulated", simulated, executor=executor)
@@ -149,13 +234,13 @@ class _RosProcess(Process):
         self._steady.run_due(times=10)
 
 
-class _OfflineProcess(OfflineProcess):
+class _OfflineProcess(_ReplayProcess, OfflineProcess):
     """A process that was one without ROS, too."""
 
-    is_replay = True
-
-    def __init__(self, transport: Transport, start: float, executor: Executor):
+    def __init__(self, transport: ReplayTransport, start: float, executor: Executor):
         super().__init__(transport, start, executor=executor)
+        # Nothing waited for a master.
+        transport.outside = lambda call, *arguments: None
 
     def move_to(self, moment: int) -> None:
         """Do nothing: both clocks have rows of their own."""
@@ -206,6 +291,7 @@ class Replay:
 
     def __exit__(self, *exception: object) -> None:
         text_file.content = self._read
+        self.process.tasks.end()
 
     @property
     def time(self) -> float:
@@ -254,6 +340,7 @@ class Replay:
             Kind.REPLY: "the answer of a service",
             Kind.SUBMITTED: "a call by a thread",
             Kind.CLOCK: "the clock",
+            Kind.TASK: "a task",
         }.get(row.kind, row.kind.name.lower().replace("_", " "))
 
     def start(self) -> bool:
@@ -390,11 +477,14 @@ class Replay:
                 f"{function}{arguments}, which cannot be repeated"
             )
 
+    def _task(self, row):
+        self._executor.submit(self.process.tasks.go_on, row.number)
+
     def _prepare_shutdown(self, _):
         self.process.prepare_shutdown(self.nodes)
 
     def _shutdown(self, _):
-        self.process.shut_down(self.nodes)
+        self.process.begin_shutdown(self.nodes)
 
     def _clock(self, row):
         offline = self._expect_offline()
@@ -425,4 +515,5 @@ class Replay:
         Kind.SHUTDOWN: _shutdown,
         Kind.CLOCK: _clock,
         Kind.LAUNCH: _launch,
+        Kind.TASK: _task,
     }

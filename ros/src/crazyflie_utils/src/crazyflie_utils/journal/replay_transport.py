@@ -4,7 +4,7 @@ import builtins
 import collections
 import json
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
@@ -21,6 +21,7 @@ from crazyflie_utils.journal.journal_file import (
     received,
 )
 from crazyflie_utils.journal.recording import (
+    NO_ERRORS,
     Digest,
     keeps_data,
     plain_type,
@@ -160,7 +161,7 @@ class _Publisher(ExternalPublisher):
         pass
 
     def close(self) -> None:
-        pass
+        self._transport.outside(None)
 
 
 class _Subscriber(ExternalSubscriber):
@@ -206,7 +207,9 @@ class ReplayTransport(Transport):
         self.flags[number] = _Flag()
         return self.flags[number]
 
-    def value(self, what: str, doing: str) -> Any:
+    def value(
+        self, what: str, doing: str, errors: Mapping[str, type[Exception]] = NO_ERRORS
+    ) -> Any:
         """Return what was read then, or raise it; ``doing`` is what the process does now."""
         row = self.rows.expect(Kind.VALUE, 0, doing)
         then, is_value, *rest = json.loads(row.data)
@@ -215,8 +218,8 @@ class ReplayTransport(Transport):
         if is_value:
             return rest[0]
         kind, text = rest
-        error = ServiceError if kind == "ServiceError" else getattr(builtins, kind, OSError)
-        raise error(text)
+        error: Any = {"ServiceError": ServiceError, **errors}.get(kind)
+        raise (error or getattr(builtins, kind, OSError))(text)
 
     def remap(self, name: str) -> str:
         """Return a remapped name."""
@@ -231,10 +234,12 @@ class ReplayTransport(Transport):
 
     def get_param(self, name: str) -> Any:
         """Return a parameter."""
+        self.outside(None)
         return self.value(name, f"reads the parameter {name}")
 
     def set_param(self, name: str, value: Any) -> None:
         """Do nothing, or fail as then."""
+        self.outside(None)
         self.value(f"set {name}", f"sets the parameter {name}")
 
     def set_param_later(self, name: str, value: Any) -> "Future[None]":
@@ -244,8 +249,10 @@ class ReplayTransport(Transport):
     def advertise(self, topic: str, message_type: Any, latch: bool) -> ExternalPublisher:
         """Return a publisher whose messages are compared."""
         self._publishers += 1
-        self.rows.check_name(Kind.ADVERTISED, self._publishers, topic, message_type._type)
-        return _Publisher(self, self._publishers, topic, self._flag())
+        number = self._publishers
+        self.rows.check_name(Kind.ADVERTISED, number, topic, message_type._type)
+        self.outside(None)
+        return _Publisher(self, number, topic, self._flag())
 
     def subscribe(
         self, topic: str, message_type: Any, deliver: Receiver, may_wait: Condition = never
@@ -263,8 +270,9 @@ class ReplayTransport(Transport):
         number = len(self.services) + 1
         self.rows.check_name(Kind.OFFERED, number, name, service_type._type)
         self.services[number] = name, service_type, serve
+        self.outside(None)
         self.value("offer", f"offers the service {name}")
-        return lambda: None
+        return lambda: self.outside(None)
 
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float, start_limit: float
@@ -284,10 +292,12 @@ class ReplayTransport(Transport):
 
     def service_nodes(self) -> dict[str, str]:
         """Return the services of then."""
+        self.outside(None)
         return self.value("services", "looks for services")
 
     def living_node(self, name: str) -> str | None:
         """Return the process of then."""
+        self.outside(None)
         return self.value(f"node {name}", f"looks for the node {name}")
 
     def random_seed(self) -> int:

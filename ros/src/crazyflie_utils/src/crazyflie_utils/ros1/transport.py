@@ -47,9 +47,14 @@ _QUEUE_SIZE = 100
 
 
 class _RosPublisher(ExternalPublisher):
-    def __init__(self, publisher: rospy.Publisher, on_close: Callable[[], None]):
+    def __init__(
+        self,
+        publisher: rospy.Publisher,
+        on_close: Callable[[], None],
+        outside: Callable[..., None],
+    ):
         self._publisher = publisher
-        self._on_close = on_close
+        self._on_close, self._outside = on_close, outside
 
     def has_subscribers(self) -> bool:
         implementation = self._publisher.impl
@@ -65,7 +70,7 @@ class _RosPublisher(ExternalPublisher):
 
     def close(self) -> None:
         self._on_close()
-        self._publisher.unregister()
+        self._outside(self._publisher.unregister)
 
 
 class _RosSubscriber(ExternalSubscriber):
@@ -152,11 +157,11 @@ class RosTransport(Transport):
 
     def get_param(self, name: str) -> Any:
         """Return a parameter from the parameter server."""
-        return rospy.get_param(self._rospy_name(name))
+        return self.outside(rospy.get_param, self._rospy_name(name))
 
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter on the parameter server."""
-        rospy.set_param(self._rospy_name(name), value)
+        self.outside(rospy.set_param, self._rospy_name(name), value)
 
     def set_param_later(self, name: str, value: Any) -> "Future[None]":
         """Set a parameter on the parameter server by a thread that may wait for it."""
@@ -166,10 +171,11 @@ class RosTransport(Transport):
         """Register a publisher with the master."""
         self._published[topic] += 1
         patches.own_publication(topic, message_type, _QUEUE_SIZE, latch)
-        publisher = rospy.Publisher(
-            self._rospy_name(topic), message_type, latch=latch, queue_size=_QUEUE_SIZE
+        register = partial(rospy.Publisher, latch=latch, queue_size=_QUEUE_SIZE)
+        publisher = self.outside(register, self._rospy_name(topic), message_type)
+        return _RosPublisher(
+            publisher, lambda: self._published.subtract([topic]), lambda *call: self.outside(*call)
         )
-        return _RosPublisher(publisher, lambda: self._published.subtract([topic]))
 
     def subscribe(
         self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
@@ -220,14 +226,16 @@ class RosTransport(Transport):
                 raise rospy.ServiceException(str(error)) from None
 
         try:
-            service = WithdrawableService(self._rospy_name(name), service_type, answer)
+            service = self.outside(
+                WithdrawableService, self._rospy_name(name), service_type, answer
+            )
         except rospy.ServiceException as error:
             raise ServiceError(str(error)) from None
         self._caller.own[name] = OwnService(service, serve)
 
         def end():
             del self._caller.own[name]
-            service.shutdown("no longer offered")
+            self.outside(service.shutdown, "no longer offered")
 
         return end
 
@@ -242,13 +250,15 @@ class RosTransport(Transport):
     def service_nodes(self) -> dict[str, str]:
         """Ask the master."""
         if not (self._is_starting and self._services_at_start):
-            _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
+            master = rosgraph.Master(rospy.get_name())
+            _, _, services = self.outside(master.getSystemState)
             self._services_at_start = {name: nodes[0] for name, nodes in services}
         return self._services_at_start
 
     def living_node(self, name: str) -> str | None:
         """Ask the master for the node, and the node itself."""
-        return None if name == rospy.get_name() else living_node(name)
+        is_own = name == rospy.get_name()
+        return self.outside(lambda: None if is_own else living_node(name))
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""

@@ -4,7 +4,7 @@
 // Those of x, y and z are the dashboard's, too. None is red, which is for what is not normal; they can be told
 // apart by those who see no red or green.
 const COLORS = ["#1f86cc", "#d98200", "#0f9f76", "#9257c2", "#64748b"];
-const BANDS = { "taking off": "#e3f2e6", "flying": "#ffffff", "descending": "#fdf1dc", "landing": "#fbe3d4" };
+const BANDS = { "taking off": "#e3f2e6", "flying": "transparent", "descending": "#fdf1dc", "landing": "#fbe3d4" };
 const KINDS = {
   "refusal": "#b45309", "pose rejected": "#9333ea", "hold": "#0891b2", "emergency": "#b42318",
   "link": "#be185d", "battery": "#a16207", "parameter": "#2563eb", "warning": "#a16207", "error": "#b42318",
@@ -55,7 +55,7 @@ class Plot {
         ...data.curves.map((curve, k) => this.series(curve, k))],
       cursor: { y: false, drag: { setScale: false }, dataIdx: (u, k, index) => this.known(u, k, index), bind: { dblclick: () => null } },
       hooks: {
-        drawClear: [(u) => this.bands(u)], draw: [(u) => this.ticks(u)], setLegend: [(u) => this.legend(u)],
+        drawClear: [(u) => this.bands(u)], draw: [(u) => { this.ticks(u); this.place(); }], setLegend: [(u) => this.legend(u)],
         setSelect: [(u) => { if (u.select.width > CLICK) this.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
       },
     };
@@ -113,11 +113,16 @@ class Plot {
 
   // Show the values at a time of the replay, s; under the mouse are those of there.
   draw(time) {
-    const { uplot, view } = this;
     this.time = time;
-    this.line.style.left = `${uplot.valToPos(time, "x")}px`;
-    this.line.hidden = time < view.from || time > view.to;
-    this.legend(uplot);
+    this.place();
+    this.legend(this.uplot);
+  }
+
+  // Put the line of the present moment where it belongs, which is known when the plot was drawn.
+  place() {
+    const { line, time, uplot, view } = this;
+    line.style.left = `${uplot.valToPos(time, "x")}px`;
+    line.hidden = time < view.from || time > view.to;
   }
 
   legend(u) {

@@ -186,6 +186,16 @@ def test_the_legend_shows_the_values_of_the_time_of_the_replay(wide, tmp_path):
     assert tell(wide, values)[6] == "1.00"
 
 
+def test_the_line_of_the_moment_is_there_when_the_page_is(wide, tmp_path):
+    open_report(wide, tmp_path, bags.flight_bag(tmp_path / "a.bag"))
+    place = "Number.parseFloat(column.plots[0].line.style.left)"
+    end = time.monotonic() + LONGEST_WAIT
+    while tell(wide, place) is None:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert tell(wide, place) == pytest.approx(tell(wide, "column.plots[0].uplot.valToPos(5, 'x')"))
+
+
 def test_flights_of_two_recordings_are_laid_over_each_other(wide, tmp_path):
     first = bags.flight_bag(tmp_path / "a.bag")
     second = bags.flight_bag(tmp_path / "b.bag")

@@ -42,7 +42,7 @@ KNOWN = {
     "other": ("thrust", "battery"),
 }
 
-DIM = {"color": "#93a0b2"}  #: Style of texts in the plots.
+DIM = {"color": "#7d8899"}  #: Style of texts in the plots.
 TOOLTIP = {
     "backgroundColor": "#1a2029",
     "borderColor": "#2a323e",
@@ -328,12 +328,13 @@ def _node(label, fields, prefix=""):
 PICTURE = """
 const chart = getElement(%s).chart, kind = %s, link = document.createElement("a");
 const size = { width: chart.getWidth(), height: chart.getHeight() };
+const backgroundColor = getComputedStyle(document.body).backgroundColor;
 const { echarts } = await import("nicegui-echart");
 const copy = echarts.init(null, null, { renderer: "svg", ssr: true, ...size });
-copy.setOption({ ...chart.getOption(), backgroundColor: "#12161d" });
+copy.setOption({ ...chart.getOption(), backgroundColor });
 const svg = () => new Blob([copy.renderToSVGString()], { type: "image/svg+xml" });
 link.href = kind === "svg" ? URL.createObjectURL(svg())
-  : chart.getDataURL({ type: "png", pixelRatio: 2, backgroundColor: "#12161d" });
+  : chart.getDataURL({ type: "png", pixelRatio: 2, backgroundColor });
 link.download = "plots." + kind;
 link.click();
 """

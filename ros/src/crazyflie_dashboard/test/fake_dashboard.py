@@ -155,12 +155,8 @@ class FakeDashboard:
     def fields(self, vehicle):
         return {f"/{vehicle}/imu": ["x", "y"], f"/{vehicle}/state": ["state/x"]}
 
-    def add_field(self, page, path):
-        self.fields_shown.append(path)
-        return done(None)
-
-    def remove_field(self, page, path):
-        self.fields_shown.remove(path)
+    def receive(self, page, paths):
+        self.fields_shown = [*paths]
 
     def progress(self):
         return self.tracked.update(self._scene.vehicles)

@@ -25,18 +25,10 @@ class Access:
     A page from another origin in the same browser is refused by its Origin, one whose name was made
     to resolve to this computer (DNS rebinding) by its Host.
 
-    Parameters
-    ----------
-    host : str
-        Address or name on which the page listens.
-    port : int
-    token : str, optional
-        Needed unless ``host`` is this computer's own.
+    ``host`` is the address or name on which the page listens; the token is needed unless that is
+    this computer's own.
 
-    Raises
-    ------
-    AccessError
-        The address needs a token, and the token is missing or too short.
+    `AccessError`: the address needs a token, and the token is missing or too short.
     """
 
     def __init__(self, host: str, port: int, token: str = ""):
@@ -62,12 +54,8 @@ class Access:
     def refusal(self, headers: Mapping[str, str], token: str = "") -> str:
         """Return why a request is refused; "" if it is not.
 
-        Parameters
-        ----------
-        headers : dict
-            Headers of the HTTP request, also of one that opens a websocket.
-        token : str
-            Token of its address; without one, that of its cookie is used.
+        The headers are those of an HTTP request, also of one that opens a websocket; without a
+        token of its address, that of its cookie is used.
         """
         fields = {name.lower(): value for name, value in headers.items()}
         host, origin = fields.get("host", ""), fields.get("origin")
@@ -123,10 +111,7 @@ def is_loopback(host: str) -> bool:
 def token_in(path: Path) -> str:
     """Return the token in a file, which is created if it is missing; only its user may read it.
 
-    Raises
-    ------
-    AccessError
-        Others may read it, or it cannot be read or made.
+    `AccessError`: others may read it, or it cannot be read or made.
     """
     try:
         if not path.exists():

@@ -3,7 +3,6 @@
 import math
 import subprocess
 from collections.abc import Iterable
-from functools import partial
 from typing import Any, NamedTuple
 
 import genpy
@@ -62,6 +61,9 @@ _YAW, _FIXED = "reference/yaw", "frames/fixed"
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
+_LANDING = Command(Action.LAND, (), 0.0)
+
+
 class Target(NamedTuple):
     """A vehicle and its newest snapshot when a command comes: its model changes meanwhile."""
 
@@ -81,15 +83,10 @@ class Bounds(NamedTuple):
 
 
 class Actions:
-    """Calls services for commands.
+    """Calls services for commands of the model's vehicles.
 
-    Parameters
-    ----------
-    model : GraphModel
-        The vehicles that are commanded; the handle, and who may wait for the master.
-    reach : float
-        Where there is no room and no geofence, the largest height of a goal, and its distance from
-        the origin along x and y (m).
+    ``reach`` is, where there is no room and no geofence, the largest height of a goal, and its
+    distance from the origin along x and y (m).
     """
 
     def __init__(self, model: GraphModel, reach: float = 10.0):
@@ -101,10 +98,7 @@ class Actions:
     def carry_out(self, command: Command) -> "Steps[Outcomes]":
         """Call the services that a command needs; return all outcomes.
 
-        Raises
-        ------
-        RefusalError
-            The command is too old or invalid.
+        `RefusalError`: the command is too old or invalid.
         """
         expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
@@ -134,12 +128,19 @@ class Actions:
         answers = {
             n: self._begin(self._command(command, targets.get(n), n)) for n in command.vehicles
         }
-        if command.action == Action.TAKEOFF and len(answers) > 1:
-            self._land_if_one_refuses(command, targets, answers)
         outcomes = yield from gathered(answers)
         if command.action == Action.TAKEOFF and any(outcomes.values()):
+            self._land([targets[name] for name, text in outcomes.items() if not text])
             outcomes = _with_others(outcomes, f"is landed: {_WAITS}")
         return outcomes
+
+    def _land(self, targets):
+        """Land those that were on the ground, since one of them has not taken off."""
+        for target in targets:
+            service = _service(target, Action.LAND)
+            if service is not None and not target.now.is_in_flight:
+                request = _request(_LANDING, service, target)
+                self._handle.call_service(service.name, service.kind, request, _FLIGHT_TIMEOUT)
 
     def limits(self, names: Iterable[str]) -> tuple[Box, str] | None:
         """Return the smallest box of goals of vehicles (m), and what it is in words."""
@@ -193,29 +194,6 @@ class Actions:
                 f"{what} ends"
             )
         return "" if is_asked or target.now.is_in_flight else target.now.takeoff_refusal
-
-    def _land_if_one_refuses(self, command, targets, answers):
-        """Land the others as soon as one of several vehicles refuses to take off."""
-        refused: list[str] = []
-
-        def land(name):
-            service = _service(targets[name], Action.LAND)
-            if service is not None and not targets[name].now.is_in_flight:
-                request = _request(command, service, targets[name])
-                self._handle.call_service(service.name, service.kind, request, _FLIGHT_TIMEOUT)
-
-        def check(name, done):
-            is_first, has_failed = not refused, done.exception() is not None
-            refused.extend([name] * has_failed)
-            if refused and not has_failed:
-                land(name)
-            elif refused and is_first:
-                for other, answer in answers.items():
-                    if not (answer.done() and answer.exception()):
-                        land(other)
-
-        for name, answer in answers.items():
-            answer.add_done_callback(partial(check, name))
 
     def _bounds(self, target):
         """Return where the goals of a vehicle may be."""

@@ -18,11 +18,7 @@ class PageControl:
     A page that is loaded again, or has lost its connection, is a new page. It has the control that
     the former one of its tab had, if no page has taken it and `RECLAIM_TIME` is not over. Nothing
     else changes when a page closes.
-
-    Parameters
-    ----------
-    clock : callable
-        s.
+    ``clock()`` is in s.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -68,10 +64,8 @@ class PageControl:
     def take(self, page: int, is_confirmed: bool = False) -> None:
         """Give a page control; all pages are notified.
 
-        Raises
-        ------
-        RefusalError
-            Another page has control, and the operator has not confirmed that it is taken over.
+        `RefusalError`: another page has control, and the operator has not confirmed that it is
+        taken over.
         """
         with self._lock:
             self.expect_open(page)

@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Collection, Generator, Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -48,20 +48,8 @@ class Dashboard:
     which fails with `RefusalError`, whose text is for the operator; if a service has refused, it is
     the service's text.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    master : Master
-    lane : EmergencyLane
-        It is closed with the dashboard.
-    folders : list of str
-        Folders with missions and trajectories.
-    clock : callable
-        time.monotonic, for the age of commands.
-    workers : concurrent.futures.Executor, optional
-        Its threads may wait.
-    reach : float
-        Of goals, see `Actions`.
+    The lane is closed with the dashboard; ``folders`` have missions and trajectories; threads of
+    ``workers`` may wait; for ``reach`` see `Actions`.
     """
 
     def __init__(
@@ -147,7 +135,7 @@ class Dashboard:
                 found[name] = model.plots.series(now)
         return found
 
-    def fields(self, vehicle: str) -> dict[str, list[str]]:
+    def fields(self, vehicle: str) -> dict[str, tuple[str, ...]]:
         """Return the topics of a vehicle, each with its fields that are numbers."""
         model, topics = self._model.models.get(vehicle), self._model.graph.topics
         if model is None:
@@ -156,13 +144,14 @@ class Dashboard:
         own = {topic: kind for topic, kind in sorted(topics.items()) if topic.startswith(space)}
         return {topic: found for topic, kind in own.items() if (found := fields_of(kind))}
 
-    def add_field(self, page: int, path: str) -> "Future[None]":
-        """Plot a number of any topic, as in /topic/field/other[0], too."""
-        return self._do(lambda: self._page(page).add_field(path, self._model.graph.topics))
+    def receive(self, page: int, paths: Collection[str]) -> None:
+        """Choose the numbers of topics that a page plots, each as in /topic/field/field."""
 
-    def remove_field(self, page: int, path: str) -> None:
-        """Remove the plot of a field."""
-        self._submit(lambda: self._page(page).remove_field(path))
+        def do():
+            if page in self._open:
+                self._open[page].receive(paths, self._model.graph.topics)
+
+        self._submit(do)
 
     def command(self, page: int, command: Command) -> "Future[Outcomes]":
         """Carry out a command of the page that has control; return an outcome for each vehicle.

@@ -42,12 +42,7 @@ class EmergencyLane:
     Connections to them are opened as soon as the master names them, also while no page is open.
     `stop` may be called from any thread, and waits for nothing.
 
-    Parameters
-    ----------
-    master : Master
-        The one that is asked for services.
-    report : callable
-        ``report(text)`` is called for each emergency and its outcome.
+    ``report(text)`` is called for each emergency and its outcome.
     """
 
     def __init__(self, master: Master, report: Callable[[str], None]):
@@ -77,16 +72,8 @@ class EmergencyLane:
     def stop(self, services: Iterable[str] | None, age: float) -> "Future[Outcomes]":
         """Call emergency services, of all vehicles if ``services`` is None.
 
-        Parameters
-        ----------
-        services : iterable of str or None
-        age : float
-            How long ago the operator clicked, s.
-
-        Returns
-        -------
-        concurrent.futures.Future
-            An outcome for each service, after 5 s at the latest; its text is "" if it has answered.
+        ``age`` is how long ago the operator clicked (s). The future has an outcome for each
+        service, after 5 s at the latest; its text is "" if it has answered.
         """
         result: Future[Outcomes] = Future()
         services = None if services is None else list(dict.fromkeys(services))

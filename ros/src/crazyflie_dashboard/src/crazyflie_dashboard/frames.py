@@ -32,14 +32,8 @@ class Pose:
 class Frames:
     """The frames of /tf and /tf_static, by the rules that nodes follow.
 
-    Parameters
-    ----------
-    time : callable
-        The machine's time, s.
-    nanoseconds : callable
-        ROS time, ns.
-    ahead : float
-        Longest time by which a stamp may be ahead of now, s.
+    ``time()`` is the machine's (s), ``nanoseconds()`` is ROS time, and ``ahead`` (s) the longest
+    time by which a stamp may be ahead of it.
     """
 
     def __init__(self, time: Callable[[], float], nanoseconds: Callable[[], int], ahead: float):

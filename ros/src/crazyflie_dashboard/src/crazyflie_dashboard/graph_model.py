@@ -58,12 +58,7 @@ _REMEDIES = {"is stamped in the future": f"{_OLDER}; {_CLOCKS}"}
 class GraphModel:
     """The running graph. Not thread-safe, except ``scene``, ``graph`` and ``models``.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    workers : concurrent.futures.Executor
-        Its threads may wait for the master.
-    master : Master
+    Threads of ``workers`` may wait for the master.
     """
 
     def __init__(

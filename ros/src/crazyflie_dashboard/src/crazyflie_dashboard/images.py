@@ -27,10 +27,7 @@ _ENCODINGS: dict[str, tuple[str, str, int]] = {
 def encoded(message: Any) -> bytes:
     """Return a sensor_msgs/Image or CompressedImage as JPEG or PNG.
 
-    Raises
-    ------
-    ValueError
-        It cannot be shown; the text says why.
+    `ValueError`: it cannot be shown; the text says why.
     """
     if not hasattr(message, "encoding"):
         data = bytes(message.data)

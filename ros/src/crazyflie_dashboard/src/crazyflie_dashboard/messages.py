@@ -32,13 +32,7 @@ def log_line(number: int, message: Log) -> LogLine:
 
 
 class Diagnostics:
-    """Diagnostics of nodes, from /diagnostics.
-
-    Parameters
-    ----------
-    time : callable
-        s.
-    """
+    """Diagnostics of nodes, from /diagnostics; ``time()`` is in s."""
 
     def __init__(self, time: Callable[[], float]):
         self._time = time

@@ -57,10 +57,7 @@ class MissionFlight:
     Its output is a file. The file ``record`` identifies the process: its number alone may belong to
     another one by now.
 
-    Raises
-    ------
-    OSError, ValueError, KeyError
-        It does not fly any more, or belongs to another master.
+    `OSError`, `ValueError`, `KeyError`: it does not fly any more, or belongs to another master.
     """
 
     def __init__(self, record: Path):
@@ -146,10 +143,7 @@ class MissionFlight:
     def stop(self) -> None:
         """Land its vehicles; kill it if it does not end.
 
-        Raises
-        ------
-        RefusalError
-            It is landing already: a second signal would interrupt that.
+        `RefusalError`: it is landing already: a second signal would interrupt that.
         """
         if self.is_stopped:
             raise RefusalError(
@@ -182,12 +176,7 @@ class MissionFlight:
 class Missions:
     """Running missions, including those that an earlier dashboard started, and dry runs.
 
-    Parameters
-    ----------
-    python : str, optional
-        Interpreter.
-    folder : Path, optional
-        Folder of records and outputs; by default in ROS's own.
+    ``python`` is the interpreter; records and outputs are in the folder, by default in ROS's own.
     """
 
     def __init__(self, python: str = sys.executable, folder: Path | None = None):
@@ -245,11 +234,8 @@ class Missions:
     ) -> "Future[str]":
         """Fly a mission; the future has "" at its end, or fails with its last output.
 
-        Raises
-        ------
-        RefusalError
-            Its dry run has not passed with these vehicles, they have moved, its files have changed
-            since, or another mission flies.
+        `RefusalError`: its dry run has not passed with these vehicles, they have moved, its files
+        have changed since, or another mission flies.
         """
         end: Future[str] = Future()
         command = self._command("fly", mission, vehicles)
@@ -283,10 +269,7 @@ class Missions:
     def stop(self) -> None:
         """End the running missions; they land their vehicles.
 
-        Raises
-        ------
-        RefusalError
-            No mission flies, or all of them are landing already.
+        `RefusalError`: no mission flies, or all of them are landing already.
         """
         with self._lock:
             flights = [each for each in self._flights if not each.is_stopped] or self._flights[:1]

@@ -42,10 +42,7 @@ def formation(places: Mapping[str, Triple], goal: Triple) -> dict[str, Triple]:
 def in_frame(point: Triple, yaw: float, frame: tuple[Triple, Rotation]) -> tuple[Triple, float]:
     """Return a point (m) and a heading (rad) in a frame, whose own position and rotation are known.
 
-    Raises
-    ------
-    ValueError
-        The rotation is not a quaternion.
+    `ValueError`: the rotation is not a quaternion.
     """
     (a, b, c), rotation = frame
     x, y, z = rotate_back(rotation, (point[0] - a, point[1] - b, point[2] - c))
@@ -72,10 +69,7 @@ def expect_apart(
     buffers : dict
         Collision buffers of vehicles that have one, m.
 
-    Raises
-    ------
-    RefusalError
-        The text names the first two.
+    `RefusalError`: the text names the first two.
     """
     names = list(places)
     radii = [max(SEPARATION / 2.0, RELEASE_RATIO * buffers.get(name, 0.0)) for name in names]

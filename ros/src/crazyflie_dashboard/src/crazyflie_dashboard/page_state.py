@@ -1,14 +1,15 @@
 """The choices of one page: a vehicle, fields of topics, a camera."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Executor
+from functools import partial
 from typing import Any
 
 import roslib.message
 
 from crazyflie_dashboard import images
 from crazyflie_dashboard.page_data import Series
-from crazyflie_dashboard.plots import Ring, expect_field, number_in, split_path
+from crazyflie_dashboard.plots import Ring, fields_of, number_in
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.steps import follow
@@ -37,33 +38,27 @@ class PageState:
         """Return the plots of fields until ``now`` (s)."""
         return tuple(ring.series(path, now) for path, (_, ring) in list(self._fields.items()))
 
-    def add_field(self, path: str, topics: Mapping[str, str]) -> None:
-        """Plot a number of one of the topics (topic -> type), or raise `RefusalError`."""
-        if path in self._fields:
-            return
-        if len(self._fields) >= _MAX_FIELDS:
-            raise RefusalError(
-                f"{path}: there are {_MAX_FIELDS} plots already, which is the maximum"
-            )
-        topic, fields = split_path(path, topics)
-        message_type = roslib.message.get_message_class(topics[topic])
-        if message_type is None:
-            raise RefusalError(f"{path}: {topics[topic]} is unknown here; source its workspace")
-        # A field that the type does not have is refused now, not when a message comes.
-        expect_field(path, message_type, fields)
-        handle, ring = self._handle.child(), Ring("")
-        handle.subscribe(
-            topic,
-            message_type,
-            lambda message: ring.add(self._clock(), number_in(message, fields)),
-        )
-        self._fields[path] = handle, ring
+    def receive(self, paths: Collection[str], topics: Mapping[str, str]) -> None:
+        """Receive numbers of the topics (topic -> type), each as in /topic/field/field.
 
-    def remove_field(self, path: str) -> None:
-        """Remove the plot of a field."""
-        if path in self._fields:
+        One whose topic is not there is not received until this is called again.
+        """
+        for path in self._fields.keys() - {*paths}:
             handle, _ = self._fields.pop(path)
             handle.close()
+        for topic, kind in topics.items():
+            for path in [each for each in paths if each.startswith(f"{topic}/")]:
+                field = path.removeprefix(f"{topic}/")
+                is_new = path not in self._fields and len(self._fields) < _MAX_FIELDS
+                if is_new and field in fields_of(kind):
+                    self._fields[path] = self._subscribe(topic, kind, field)
+
+    def _subscribe(self, topic, kind, field):
+        handle, ring = self._handle.child(), Ring("")
+        message_type = roslib.message.get_message_class(kind)
+        take = partial(number_in, field=field)
+        handle.subscribe(topic, message_type, lambda m: ring.add(self._clock(), take(m)))
+        return handle, ring
 
     def watch_image(self, topic: str | None, topics: Mapping[str, str]) -> None:
         """Show a camera, or none; `RefusalError` if the topic is not a camera."""
@@ -82,8 +77,7 @@ class PageState:
     def close(self) -> None:
         """End all subscriptions."""
         self.watch_image(None, {})
-        for path in list(self._fields):
-            self.remove_field(path)
+        self.receive((), {})
 
     def _on_image(self, message):
         if self._is_encoding:

@@ -82,10 +82,7 @@ def of_firmware(vehicle: str, tree: Mapping[str, Any]) -> Iterator[ParameterInfo
 def parsed(parameter: ParameterInfo, text: str) -> bool | int | float | str:
     """Return the typed value.
 
-    Raises
-    ------
-    RefusalError
-        It is not of this kind, out of range, or not one of the choices.
+    `RefusalError`: it is not of this kind, out of range, or not one of the choices.
     """
     where = f"{parameter.owner}: {parameter.name} is {text!r}; expected"
     word = text.strip()

@@ -1,9 +1,9 @@
 """Numbers of the last minutes, to be plotted."""
 
 import math
-import re
-from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,6 @@ from crazyflie_dashboard.history import SPAN
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_utils.refusal import RefusalError
 
 WINDOW = 60.0  #: Time that a plot shows (s).
 _PERIOD = 0.05  #: Period of the numbers that are kept (s).
@@ -62,13 +61,7 @@ class Ring:
 
 
 class VehiclePlots:
-    """Plots of one vehicle.
-
-    Parameters
-    ----------
-    time : callable
-        s.
-    """
+    """Plots of one vehicle; ``time()`` is in s."""
 
     def __init__(self, time: Callable[[], float]):
         self._time = time
@@ -130,85 +123,22 @@ class VehiclePlots:
         self._rings[name].add(self._time(), value)
 
 
-def fields_of(kind: str, depth: int = 4) -> list[str]:
+@lru_cache
+def fields_of(kind: str, depth: int = 4) -> tuple[str, ...]:
     """Return the numbers of a type of messages, as in pose/position/x; none of lists."""
     found = roslib.message.get_message_class(kind) if "/" in kind and depth else None
     if found is None:
-        return []
-    names = []
+        return ()
+    names: list[str] = []
     for name, each in zip(found.__slots__, found._slot_types, strict=True):
         if each in _NUMBERS:
             names.append(name)
         elif not each.endswith("]"):
             names += [f"{name}/{rest}" for rest in fields_of(each, depth - 1)]
-    return names
+    return tuple(names)
 
 
-def split_path(path: str, topics: Mapping[str, str]) -> tuple[str, list[str | int]]:
-    """Return the topic of a path, and names of fields and indices within its messages.
-
-    Parameters
-    ----------
-    path : str
-        As in /cf1/state/state.x or /cf1/log/values[0].
-    topics : dict
-        Topic -> type, of all topics.
-
-    Raises
-    ------
-    RefusalError
-        The topic does not exist, or no field is named.
-    """
-    parts = path.strip().rstrip("/").split("/")
-    for count in range(len(parts), 1, -1):
-        topic = "/".join(parts[:count])
-        if topic in topics:
-            break
-    else:
-        raise RefusalError(f"{path}: no such topic; expected one that is published, then a field")
-    rest = "/".join(parts[count:])
-    fields = re.findall(r"[A-Za-z_]\w*|\[\d+\]", rest)
-    if not fields or "".join(fields) != re.sub(r"[./]", "", rest):
-        raise RefusalError(
-            f"{path}: {rest!r} is not a field of {topics[topic]}; expected for example "
-            "field/other[0]"
-        )
-    return topic, [int(each[1:-1]) if each[0] == "[" else each for each in fields]
-
-
-def expect_field(path: str, message_type: Any, fields: list[str | int]) -> None:
-    """Check that messages of a type have a number where ``fields`` lead.
-
-    Raises
-    ------
-    RefusalError
-        The field does not exist, or is not a number.
-    """
-    kind = message_type._type
-    for field in fields:
-        if isinstance(field, int):
-            if not kind.endswith("]"):
-                raise RefusalError(f"{path}: [{field}] of a {kind}; expected a list")
-            kind = kind.rpartition("[")[0]
-            continue
-        found = roslib.message.get_message_class(kind)
-        types = {} if found is None else dict(zip(found.__slots__, found._slot_types, strict=True))
-        if field not in types:
-            known = ", ".join(types) or "no fields"
-            raise RefusalError(f"{path}: there is no {field!r} in {kind}; it has {known}")
-        kind = types[field]
-    if kind not in _NUMBERS:
-        raise RefusalError(f"{path} is a {kind}; expected a number")
-
-
-def number_in(message: Any, fields: list[str | int]) -> float:
-    """Return a number of a message, NaN for an element that a list does not have."""
-    value = message
-    for field in fields:
-        if isinstance(field, str):
-            value = getattr(value, field)
-        elif field < len(value):
-            value = value[field]
-        else:
-            return math.nan
+def number_in(message: Any, field: str) -> float:
+    """Return the number of a message in one of the `fields_of` its type."""
+    value = attrgetter(field.replace("/", "."))(message)
     return float(value.to_sec() if hasattr(value, "to_sec") else value)

@@ -68,11 +68,7 @@ class Commands:
     """The last commands of all pages.
 
     `update` and the callbacks of futures are called in the node's turn, `begin` in any thread.
-
-    Parameters
-    ----------
-    time : callable
-        s.
+    ``time()`` is in s.
     """
 
     def __init__(self, time: Callable[[], float]):

@@ -41,12 +41,8 @@ class Recorded:
 class Recording:
     """Starts and ends the recorder, and makes reports.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        Folder for the recordings, each in a folder with the date; by default that of others.
-    programs : callable, optional
-        ``programs(name)`` returns the path of a program of crazyflie_reports.
+    Each is in a folder with its date below ``folder``, by default that of others;
+    ``programs(name)`` returns the path of a program of crazyflie_reports.
     """
 
     def __init__(self, folder: Path | None = None, programs: Any = None):
@@ -96,10 +92,7 @@ class Recording:
     def make_report(self, names: Sequence[str]) -> str:
         """Make a report on one recording, or on two laid over each other; wait for it.
 
-        Raises
-        ------
-        RefusalError
-            There is no such recording, or no report on it.
+        `RefusalError`: there is no such recording, or no report on it.
         """
         folder = self._report_folder(names)
         if folder is None:
@@ -121,10 +114,7 @@ class Recording:
     def start(self) -> None:
         """Begin to record.
 
-        Raises
-        ------
-        RefusalError
-            A recording is running.
+        `RefusalError`: a recording is running.
         """
         if self.text:
             raise RefusalError(f"record: {self.text}; end it first")
@@ -138,10 +128,7 @@ class Recording:
     def stop(self) -> "Future[str]":
         """End the recording; the future is done when its report has been made.
 
-        Raises
-        ------
-        RefusalError
-            No recording is running.
+        `RefusalError`: no recording is running.
         """
         recorder, self._recorder = self._recorder, None
         if recorder is None:

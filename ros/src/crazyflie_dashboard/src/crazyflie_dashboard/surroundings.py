@@ -43,12 +43,7 @@ _LISTS = {
 
 
 class Surroundings:
-    """Follows topics until its handle is closed; their content is shown while they exist.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    """
+    """Follows topics until its handle is closed; their content is shown while they exist."""
 
     def __init__(self, handle: NodeHandle):
         self._handle = handle

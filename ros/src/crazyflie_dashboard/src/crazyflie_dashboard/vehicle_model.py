@@ -54,15 +54,8 @@ _LOW_BATTERY = 3.2  #: Voltage that is low if no driver reports it; that of the 
 class VehicleModel:
     """A vehicle and its topics.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-        Closed when the vehicle goes.
-    vehicle : FoundVehicle
-    time : callable
-        The machine's time, s.
-    plots : VehiclePlots, optional
-        What has been plotted of the vehicle until now.
+    The handle is closed when the vehicle goes; ``time()`` is the machine's (s); ``plots`` has what
+    has been plotted of it until now.
     """
 
     def __init__(

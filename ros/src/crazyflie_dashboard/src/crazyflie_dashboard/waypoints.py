@@ -75,10 +75,7 @@ class Waypoints:
 def save(folder: Path, name: str, points: Points) -> Path:
     """Write the mission through points (m); return its file.
 
-    Raises
-    ------
-    RefusalError
-        There is no point, or the name is not that of a file.
+    `RefusalError`: there is no point, or the name is not that of a file.
     """
     if not points:
         raise RefusalError("save: no waypoint is set; click on the floor to set one")

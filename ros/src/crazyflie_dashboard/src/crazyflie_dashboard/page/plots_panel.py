@@ -66,8 +66,6 @@ class PlotsPanel:
         self._session = session
         self._lines: list[Line] = []
         self._window = (-SPAN, 0.0)
-        self._fields: set[str] = set()  # Paths of fields that are received for this page.
-        self._page = 0  # Its number then.
         asked = context.client.request.query_params.get("plots", "")
         self._ticked = [each for each in asked.split(",") if each] or list(FIRST)
         with ui.element("div").classes("tools"):
@@ -103,25 +101,12 @@ class PlotsPanel:
             return
         names = self._session.plotted
         self._name.text = ", ".join(names) or "Select a vehicle to see its plots"
-        self._receive(names)
+        paths = {f"{space(name)}{path}" for name in names for path in self._ticked if "/" in path}
+        self._session.dashboard.receive(self._session.page, paths)
         found = self._session.dashboard.plots(self._session.page, self._session.past)
         self._build_tree(names, found)
         self._lines = lines(names, found, self._ticked)
         self._draw()
-
-    def _receive(self, names: Sequence[str]) -> None:
-        """Receive the fields of topics that are ticked, of these vehicles."""
-        paths = [each for each in self._ticked if "/" in each]
-        wanted = {f"{space(name)}{path}" for name in names for path in paths}
-        dashboard, page = self._session.dashboard, self._session.page
-        if page != self._page:
-            self._page, self._fields = page, set()
-        for path in self._fields - wanted:
-            dashboard.remove_field(page, path)
-        for path in wanted - self._fields:
-            # A vehicle without the topic has no line.
-            dashboard.add_field(page, path)
-        self._fields = wanted
 
     def _build_tree(self, names, found):
         known = {series.name for name in names for series in found.get(name, ())}

@@ -65,10 +65,7 @@ async def _report(dashboard: Dashboard, request: Request) -> Response:
 class Page:
     """The server of the page until `close`; one in a process, as NiceGUI's application.
 
-    Raises
-    ------
-    OSError
-        The address cannot be listened on.
+    `OSError`: the address cannot be listened on.
     """
 
     def __init__(self, dashboard: Dashboard, access: Access):

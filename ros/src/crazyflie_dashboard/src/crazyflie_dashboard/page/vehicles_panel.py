@@ -1,7 +1,7 @@
 """Cards of the vehicles, and commands for the chosen ones."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -57,19 +57,18 @@ class VehiclesPanel:
                 "flat dense"
             )
             ui.button("None", on_click=lambda: self._choose_only(())).props("flat dense")
+        self._buttons: dict[Action, ui.button] = {}
         with ui.element("div").classes("tools"):
-            self._up = self._button("Take off", self._take_off)
-            self._up.props("icon=flight_takeoff color=positive")
+            self._add_button("Take off", Action.TAKEOFF, "icon=flight_takeoff color=positive")
             self._height = _number("height, m", 1.0, *HEIGHTS)
-            self._down = self._button("Land", self._land).props("icon=flight_land color=primary")
-            self._stay = self._button("Hold", self._hold).props("icon=pause color=secondary")
-            self._reset = self._button("Reset", self._end_emergency)
-            self._reset.props("icon=restart_alt color=warning")
-            self._reset.set_visibility(False)
+            self._add_button("Land", Action.LAND, "icon=flight_land color=primary")
+            self._add_button("Hold", Action.HOLD, "icon=pause color=secondary")
+            self._add_button("Reset", Action.RESET, "icon=restart_alt color=warning")
+            self._buttons[Action.RESET].set_visibility(False)
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
             self._yaw = _number("yaw, °")
-            self._near = self._button("Go", self._go).props("icon=near_me color=accent")
+            self._add_button("Go", Action.GO_TO, "icon=near_me color=accent")
         for field in (*self._goal, self._yaw):
             field.on_value_change(self._draw_goal)
         self._limits = ui.label().classes("hint limits")
@@ -85,8 +84,12 @@ class VehiclesPanel:
         scene_view.on("choose", self._choose)
         scene_view.on("goal", self._set_goal)
 
-    def _button(self, text: str, handler: Callable[..., Any]) -> ui.button:
-        return ui.button(text).props("unelevated").on("click", handler, js_handler=CLICKED)
+    def _add_button(self, text: str, action: Action, look: str) -> None:
+        async def send(event: GenericEventArguments) -> None:
+            await self._command(action, self._session.chosen_names, event.args)
+
+        button = self._buttons[action] = ui.button(text).props(f"unelevated {look}")
+        button.on("click", send, js_handler=CLICKED)
 
     def refresh(self, scene: Scene) -> None:
         """Show the present state of the vehicles, and what can be done with them."""
@@ -94,15 +97,9 @@ class VehiclesPanel:
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} selected"
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
         obstacle = self._session.obstacle
-        for button, action in (
-            (self._up, Action.TAKEOFF),
-            (self._down, Action.LAND),
-            (self._stay, Action.HOLD),
-            (self._near, Action.GO_TO),
-            (self._reset, Action.RESET),
-        ):
+        for action, button in self._buttons.items():
             allow(button, obstacle or why_not(action, chosen))
-        self._reset.set_visibility(any(each.is_emergency for each in chosen))
+        self._buttons[Action.RESET].set_visibility(any(each.is_emergency for each in chosen))
         self._hide_goal_that_is_reached(chosen)
         self._limits.text = limits_text(self._session.dashboard.limits(names))
         left = {
@@ -125,32 +122,31 @@ class VehiclesPanel:
         self.refresh(self._session.scene())
 
     async def _act(self, event: GenericEventArguments) -> None:
-        names, clicked = [event.args["name"]], event.args["clicked"]
-        if (action := Action(event.args["action"])) is Action.TAKEOFF:
-            await self._ascend(names, clicked)
-        else:
-            await self._session.command(action, names, clicked)
+        action, names = Action(event.args["action"]), [event.args["name"]]
+        await self._command(action, names, event.args["clicked"])
 
-    async def _take_off(self, event: GenericEventArguments) -> None:
-        await self._ascend(self._session.chosen_names, event.args)
-
-    async def _ascend(self, names: Iterable[str], clicked: float) -> None:
-        if self._height.value is None:
-            self._session.say("take off: type a height", "warning")
-            return
-        await self._session.command(Action.TAKEOFF, names, clicked, height=self._height.value)
-
-    async def _land(self, event: GenericEventArguments) -> None:
-        await self._session.command(Action.LAND, self._session.chosen_names, event.args)
-
-    async def _hold(self, event: GenericEventArguments) -> None:
-        self._sent = None
-        await self._session.command(Action.HOLD, self._session.chosen_names, event.args)
-
-    async def _end_emergency(self, event: GenericEventArguments) -> None:
-        vehicles = self._session.vehicles
-        names = [name for name in self._session.chosen_names if vehicles[name].is_emergency]
-        await self._session.command(Action.RESET, names, event.args)
+    async def _command(self, action: Action, names: Sequence[str], clicked: float) -> None:
+        """Command vehicles by what is in the fields."""
+        details: dict[str, Any] = {}
+        goal = tuple(field.value for field in self._goal)
+        if action is Action.TAKEOFF:
+            if self._height.value is None:
+                self._session.say("take off: type a height", "warning")
+                return
+            details = {"height": self._height.value}
+        elif action is Action.GO_TO:
+            if None in goal:
+                self._session.say("go to: click on the floor, or type x, y and z", "warning")
+                return
+            yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
+            details = {"goal": goal, "yaw": yaw}
+        elif action is Action.HOLD:
+            self._sent = None
+        elif action is Action.RESET:
+            vehicles = self._session.vehicles
+            names = [name for name in names if vehicles[name].is_emergency]
+        if await self._session.command(action, names, clicked, **details) and "goal" in details:
+            self._sent = goal
 
     def _set_goal(self, event: GenericEventArguments) -> None:
         x, y, z = self._goal
@@ -186,16 +182,6 @@ class VehiclesPanel:
             self._sent = None
             for field in self._goal[:2]:
                 field.value = None
-
-    async def _go(self, event: GenericEventArguments) -> None:
-        goal = [field.value for field in self._goal]
-        if None in goal:
-            self._session.say("go to: click on the floor, or type x, y and z", "warning")
-            return
-        yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
-        names = self._session.chosen_names
-        if await self._session.command(Action.GO_TO, names, event.args, goal=tuple(goal), yaw=yaw):
-            self._sent = tuple(goal)
 
 
 def limits_text(limits: tuple[Box, str] | None) -> str:

@@ -9,7 +9,7 @@ import time
 
 import pytest
 from geometry_msgs.msg import PointStamped
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from std_msgs.msg import Float64, String
 
@@ -376,6 +376,8 @@ _DATA = st.one_of(
     st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 3), st.integers(0, 3), _DATA)),
     st.integers(0, 30),
 )
+@example([(Kind.WALL, 0, 0, b"")], 1)
+@example([(Kind.CLOCK, 1, 0, b"too long for a number")], 1)
 def test_a_journal_into_which_anything_was_written_ends_with_an_outcome(
     tmp_path_factory, rows, begin
 ):

@@ -40,6 +40,16 @@ from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQ
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 
 
+def _number(layout, row):
+    """Return the number that is the data of a row."""
+    if len(row.data) != layout.size:
+        raise DifferenceError(
+            f"the journal is damaged: {row.kind.name} has {len(row.data)} bytes; expected "
+            f"{layout.size}"
+        )
+    return layout.unpack(row.data)[0]
+
+
 class _ReplayExecutor(Executor):
     """Runs the timers that are due when the journal says so."""
 
@@ -157,7 +167,7 @@ class _ReplayClock(SteadyClock):
     def _read(self):
         if not self._executor.is_running_here:
             row = self._rows.expect(Kind.TIME, 0, "reads the clock")
-            (self.now,) = _U64.unpack(row.data)
+            self.now = _number(_U64, row)
         return self.now
 
     @override
@@ -168,7 +178,7 @@ class _ReplayClock(SteadyClock):
     def nanoseconds(self, moment: float | None = None) -> int:
         now, row = self._read(), self._rows.next
         if row is not None and row.kind is Kind.WALL and row.number == 1:
-            (self.wall_offset,) = _I64.unpack(self._rows.take().data)
+            self.wall_offset = _number(_I64, self._rows.take())
         return (now if moment is None else round(moment * 1e9)) + self.wall_offset
 
 
@@ -377,7 +387,7 @@ class Replay:
         if row is None:
             return False
         if row.kind is Kind.WALL:
-            (self.process.wall_offset,) = _I64.unpack(self.rows.take().data)
+            self.process.wall_offset = _number(_I64, self.rows.take())
             return True
         if row.kind is Kind.PEERS and row.number in self.transport.flags:
             self.transport.flags[row.number].value = bool(self.rows.take().value)
@@ -489,7 +499,7 @@ class Replay:
     def _clock(self, row):
         offline = self._expect_offline()
         set_clock = (offline.set_clock, offline.set_machine_clock)[row.number]
-        set_clock(*_MOMENT.unpack(row.data))
+        set_clock(_number(_MOMENT, row))
 
     def _launch(self, row):
         name, path = json.loads(row.data)

@@ -347,8 +347,10 @@ def test_a_mixed_up_journal_is_refused_and_runs_nothing_of_its_own(tmp_path_fact
         run(replay)
 
 
+#: Kinds whose data are a number.
+NUMBERS = Kind.TIME, Kind.WALL, Kind.CLOCK
 ROWS = st.tuples(
-    st.sampled_from([kind for kind in Kind if kind is not Kind.CHECKED]),
+    st.sampled_from([kind for kind in Kind if kind not in (Kind.CHECKED, *NUMBERS)]),
     st.integers(0, 2),
     st.integers(0, 0xFFFFFFFF),
     st.sampled_from([b"", b"1234", b"1235", b"0" * 300, bytes(range(256))]),
@@ -369,6 +371,19 @@ def test_rows_are_read_as_they_were_written(tmp_path_factory, rows, is_ended):
         for kind, number, value, data in rows
     ]
     assert list(Journal(path).rows()) == expected
+
+
+@pytest.mark.parametrize("kind", NUMBERS)
+@pytest.mark.parametrize("is_ended", [False, True])
+def test_a_number_of_another_size_is_damage(path, kind, is_ended):
+    writer = JournalWriter(path, HEADER, 1e9, print)
+    writer.row(kind, 0, 0, b"12345678")
+    writer.row(kind, 0, 0, b"123")
+    if is_ended:
+        writer.close()
+    journal = Journal(path)
+    assert [each.data for each in journal.rows()] == [b"12345678"]
+    assert journal.damage == "a row is damaged"
 
 
 @pytest.mark.parametrize("program", ["os:abort", "subprocess:run", "no_such_module:Node", "os"])

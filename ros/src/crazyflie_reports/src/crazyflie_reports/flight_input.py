@@ -20,19 +20,16 @@ from crazyflie_reports.bag_ros2 import SUFFIXES
 from crazyflie_reports.recorder import PARAMETERS
 from crazyflie_utils import launch_file
 from crazyflie_utils.journal.journal_file import (
-    INPUTS,
-    NAMES,
     SUFFIX,
     Journal,
     JournalError,
     Kind,
-    Row,
     SourcesError,
     received,
 )
 from crazyflie_utils.journal.recording import plain_type, serialized
 from crazyflie_utils.journal.replay import Replay
-from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
+from crazyflie_utils.journal.replay_transport import DifferenceError, EndError, Rows
 
 COMPOSED = "/composed"  #: The process of all nodes, if they are in one.
 
@@ -191,8 +188,6 @@ def of_journals(paths: list[Path]) -> FlightInput:
     for path in paths:
         journal = Journal(path)
         given = _JournalInput(journal)
-        for row in journal.rows():
-            given.take(row)
         if given.has_no_times:
             raise InputError(
                 f"{path} is of a process that publishes /clock itself: its messages have no times; "
@@ -233,7 +228,6 @@ class _JournalInput:
     """Inputs of one process, from the rows of its journal, without running anything."""
 
     def __init__(self, journal: Journal):
-        header = journal.header
         self.parameters: list[tuple[str, Any]] = []
         self.launched: dict[str, str] = {}
         self.remappings: dict[str, str] = {}
@@ -244,23 +238,26 @@ class _JournalInput:
         #: Topics whose messages are of another version of their type than today's, and the type.
         self.outdated: dict[str, str] = {}
         self._messages: dict[int, list[Given]] = {}
-        self._names: dict[tuple[Kind, int], list[str]] = {}
-        self._path, self._clock = journal.path, header["clock"]
-        # Time of the process without the offset of the wall clock, and this offset (s).
-        self._time = header["us"] * 1e-6 if self._clock == "steady" else header["start"]
-        self._wall, self._inputs = 0.0, 0
+        self._rows, self._clock = Rows(journal), journal.header["clock"]
+        self._simulated = 0.0  # The latest time on /clock, s.
+        while self._rows.next is not None:
+            row = self._rows.next
+            try:
+                self._take(self._rows.take())
+            except (ValueError, LookupError, TypeError, struct.error, genpy.DeserializationError):
+                raise JournalError(f"{journal.path}: a {row.kind.name} cannot be read") from None
 
     @property
     def has_no_times(self) -> bool:
         """Whether the process had simulated time, and got none."""
-        return self._clock == "simulated" and not self._time
+        return self._clock == "simulated" and not self._simulated
 
-    def take(self, row: Row) -> None:
-        """Add what a row has."""
-        try:
-            self._take(row)
-        except (ValueError, LookupError, TypeError, struct.error, genpy.DeserializationError):
-            raise JournalError(f"{self._path}: a {row.kind.name} cannot be read") from None
+    def _time(self):
+        """Return the ROS time of the present input, s."""
+        if self._clock == "simulated":
+            return self._simulated
+        own = self._rows.us * 1e-6 if self._clock == "steady" else self._rows.moment
+        return own + self._rows.wall_offset * 1e-9
 
     def series(self) -> Iterator[tuple[str, list[Given]]]:
         """Yield topic and messages of each subscription."""
@@ -268,17 +265,9 @@ class _JournalInput:
             yield messages[0].topic, messages
 
     def _take(self, row):
-        if row.kind in INPUTS:
-            self._inputs += 1
-            self._time += row.value * 1e-6 if self._clock == "steady" else 0.0
-        if row.kind in NAMES:
-            self._names[row.kind, row.number] = json.loads(row.data)
-        elif row.kind is Kind.MESSAGE:
+        names = self._rows.names
+        if row.kind is Kind.MESSAGE:
             self._add(row)
-        elif row.kind is Kind.WALL and self._clock != "simulated":
-            self._wall = int.from_bytes(row.data, "little", signed=True) * 1e-9
-        elif row.kind is Kind.CLOCK and row.number == 0:
-            (self._time,) = struct.unpack("<d", row.data)
         elif row.kind is Kind.VALUE:
             what, is_value, *rest = json.loads(row.data)
             if is_value and what.startswith("/"):
@@ -293,41 +282,41 @@ class _JournalInput:
         elif row.kind is Kind.LAUNCH:
             name, path = json.loads(row.data)
             self.launched[name] = path
-        elif row.kind is Kind.CALL and (Kind.OFFERED, row.number) not in self._names:
+        elif row.kind is Kind.CALL and row.number not in names[Kind.OFFERED]:
             self.unnamed += 1
         elif row.kind is Kind.CALL:
-            name, kind = self._names[Kind.OFFERED, row.number]
+            name, kind = names[Kind.OFFERED][row.number]
             service_type = roslib.message.get_service_class(kind)
             request = service_type._request_class().deserialize(row.data)
-            self.calls.append((self._time + self._wall, name, request))
+            self.calls.append((self._time(), name, request))
 
     def _add(self, row):
-        if (Kind.SUBSCRIBED, row.number) not in self._names:
+        names = self._rows.names
+        if row.number not in names[Kind.SUBSCRIBED]:
             self.unnamed += 1
             return
-        topic, datatype = self._names[Kind.SUBSCRIBED, row.number]
+        topic, datatype = names[Kind.SUBSCRIBED][row.number]
         message_type = roslib.message.get_message_class(datatype)
         if message_type is None:
             raise ValueError(datatype)
         connection, _, data = received(row)
         if topic == "/clock" and self._clock == "simulated":
-            self._time = message_type().deserialize(data).clock.to_sec()
+            self._simulated = message_type().deserialize(data).clock.to_sec()
         if row.number not in self._messages:
             try:
                 message_type().deserialize(data)
             except genpy.DeserializationError:
                 self.outdated[topic] = datatype
                 return
-        caller = self._names.get((Kind.CALLER, connection), [""])[0]
-        time = self._time + self._wall
-        given = Given(time, topic, message_type, data, caller, self._inputs)
+        caller = names[Kind.CALLER].get(connection, [""])[0]
+        given = Given(self._time(), topic, message_type, data, caller, self._rows.inputs)
         self._messages.setdefault(row.number, []).append(given)
 
 
 def _published_again(journal: Journal, found: FlightInput) -> dict[str, list[Given]]:
     """Return what the nodes of a journal publish when they run again, by topic."""
     sent: dict[str, list[Given]] = {}
-    node, inputs = journal.header["node"], 0
+    node = journal.header["node"]
 
     def note(topic: str, message: genpy.Message) -> None:
         # What is published at the start is published again; the clock is not known yet.
@@ -336,7 +325,7 @@ def _published_again(journal: Journal, found: FlightInput) -> dict[str, list[Giv
         data, kind = serialized(message), plain_type(type(message))
         time = _time_of(replay, journal.header)
         # Behind what has led to it.
-        given = Given(time, topic, kind, data, node, inputs + 0.5)
+        given = Given(time, topic, kind, data, node, replay.rows.inputs + 0.5)
         sent.setdefault(topic, []).append(given)
 
     try:
@@ -346,14 +335,13 @@ def _published_again(journal: Journal, found: FlightInput) -> dict[str, list[Giv
             found.classes.update(
                 {name: _path_of(each) for name, each in replay.nodes.items() if is_running}
             )
-            while is_running and (row := replay.rows.next) is not None:
-                inputs += row.kind in INPUTS
-                replay.step()
+            while is_running and replay.step():
+                pass
     except SourcesError as error:
         found.remarks.append(f"what it published is not known: {error}")
     except (JournalError, DifferenceError) as error:
         found.remarks.append(
-            f"{journal.path.name}: what was published after {replay.time:.3f} s is not known, "
+            f"{journal.path.name}: what was published after {replay.rows.time:.3f} s is not known, "
             f"since today's nodes do something else: {error}"
         )
     except EndError:
@@ -363,11 +351,11 @@ def _published_again(journal: Journal, found: FlightInput) -> dict[str, list[Giv
 
 def _time_of(replay, header):
     """Return the ROS time of the present input, s; a clock that is asked would read on."""
-    process = replay.process
+    rows = replay.rows
     if header["clock"] == "steady":
-        return header["us"] * 1e-6 + replay.time + process.machine.wall_offset * 1e-9
-    offset = process.clock.wall_offset if header["clock"] == "manual" else 0.0
-    return process.clock.time() + offset
+        return rows.us * 1e-6 + rows.wall_offset * 1e-9
+    clock = replay.process.clock
+    return clock.time() + (clock.wall_offset if header["clock"] == "manual" else 0.0)
 
 
 def _path_of(node):

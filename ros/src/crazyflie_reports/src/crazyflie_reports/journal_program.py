@@ -13,12 +13,11 @@ from typing import Any
 import genpy
 import roslib.message
 
-from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, Row, received
+from crazyflie_utils.journal.journal_file import Journal, JournalError, Kind, Row, received
 from crazyflie_utils.journal.replay_transport import Rows
 
 _GAP = 0.5  #: Time without an input that is listed (s): longer than most periods.
 _MAX_LINES = 20  #: Lines of calls, and of gaps.
-_MOMENT = struct.Struct("<d")
 
 
 class Contents:
@@ -33,19 +32,13 @@ class Contents:
         self.gaps: list[str] = []
         self.counts: Counter[tuple[Kind, int]] = Counter()
         self.callers: defaultdict[int, set[str]] = defaultdict(set)
-        self.kinds: Counter[Kind] = Counter()
         self.threads: Counter[str] = Counter()  #: Functions that threads have called.
 
     def rows(self) -> Iterator[Row]:
         """Yield the rows, and count them; `JournalError` or ValueError for one that is none."""
-        start, is_manual = self.journal.header["start"], self.journal.header["clock"] == "manual"
         while self.names.next is not None:
             row, before = self.names.take(), self.time
-            self.kinds[row.kind] += 1
-            if is_manual and row.kind is Kind.CLOCK and row.number == 0:
-                self.time = _MOMENT.unpack(row.data)[0] - start
-            elif not is_manual and row.kind in INPUTS:
-                self.time += row.value * 1e-6
+            self.time = self.names.time
             if self.time - before > _GAP:
                 self.gaps.append(f"{before:.3f} s to {self.time:.3f} s")
             self._count(row)
@@ -90,8 +83,7 @@ class Contents:
         header, journal = self.journal.header, self.journal
         what = header["program"] or "nodes without a program"
         lines = [f"{header['node']} ({what}), clock {header['clock']}, {self.began()}"]
-        inputs = sum(count for kind, count in self.kinds.items() if kind in INPUTS)
-        lines.append(f"{self.time:.1f} s, {inputs:,} inputs; {self._end()}")
+        lines.append(f"{self.time:.1f} s, {self.names.inputs:,} inputs; {self._end()}")
         lines += _section(
             "parameters at the start",
             [f"{name}: {json.dumps(value)}" for name, value in self.parameters.items()],
@@ -123,7 +115,7 @@ class Contents:
     def _end(self):
         if self.journal.header["clock"] == "manual":
             return "with a clock set by hand"
-        return "ended by itself" if self.kinds[Kind.SHUTDOWN] else "did not end by itself"
+        return "ended by itself" if self.names.counts[Kind.SHUTDOWN] else "did not end by itself"
 
 
 def _section(title, lines, most=sys.maxsize):

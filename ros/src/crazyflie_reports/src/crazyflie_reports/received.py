@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 
 import genpy
 
-from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, received
+from crazyflie_utils.journal.journal_file import Journal, JournalError, Kind, received
 from crazyflie_utils.journal.recording import serialized
 from crazyflie_utils.journal.replay_transport import Rows
-
-_I64 = struct.Struct("<q")
 
 
 class Received(NamedTuple):
@@ -68,12 +66,9 @@ def _messages(path: Path, node: str, topic: str, type_name: str) -> Iterator[Rec
     """Yield the messages of a node on a topic, as one subscription has received them."""
     try:
         journal = Journal(path)
-        rows, us, wall, first = Rows(journal), journal.header["us"], 0, None
+        rows, first = Rows(journal), None
         while rows.next is not None:
             row = rows.take()
-            us += row.value if row.kind in INPUTS else 0
-            if row.kind is Kind.WALL:
-                (wall,) = _I64.unpack(row.data)
             if row.kind is not Kind.MESSAGE:
                 continue
             if rows.names[Kind.SUBSCRIBED].get(row.number) != [topic, type_name]:
@@ -82,7 +77,7 @@ def _messages(path: Path, node: str, topic: str, type_name: str) -> Iterator[Rec
             connection = rows.connection(number) or {}
             if connection.get("callerid") == node and first in (None, row.number):
                 first = row.number
-                yield Received(journal.header["node"], us * 1000 + wall, data)
+                yield Received(journal.header["node"], rows.us * 1000 + rows.wall_offset, data)
     except (JournalError, struct.error, ValueError, TypeError):
         # What can be read of it is enough.
         return

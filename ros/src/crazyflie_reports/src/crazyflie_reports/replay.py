@@ -126,7 +126,7 @@ class _Run:
                 self._start()
                 while replay.rows.next is not None:
                     if replay.rows.next.kind in INPUTS:
-                        begin, self._inputs = replay.next_time, self._inputs + 1
+                        begin, self._inputs = replay.rows.next_time, self._inputs + 1
                         self._report(begin, journal.position, self._inputs)
                         if break_at is not None and begin >= break_at - _HALF_US:
                             break_at = trace_callbacks()
@@ -173,16 +173,16 @@ class _Run:
 
     def _log(self, level: str, text: str) -> None:
         if self._has_log:
-            self._notes.append(f"{self._replay.time:.6f} s [{level}] {text.strip()}")
+            self._notes.append(f"{self._replay.rows.time:.6f} s [{level}] {text.strip()}")
         elif level in ("error", "fatal"):
             self._note(text)
 
     def _note(self, text: str) -> None:
         if len(self._notes) < _MAX_NOTES:
-            self._notes.append(f"{self._replay.time:.6f} s: {text.strip()}")
+            self._notes.append(f"{self._replay.rows.time:.6f} s: {text.strip()}")
 
     def _outcome(self, status: Status, text: str) -> Outcome:
-        passed, took = self._replay.time, time.perf_counter() - self._began
+        passed, took = self._replay.rows.time, time.perf_counter() - self._began
         messages = self._replay.rows.counts[Kind.PUBLISHED]
         first = (
             f"{self._journal.header['node']}: {text}: {self._inputs:,} callbacks, "
@@ -198,11 +198,11 @@ class _Run:
         replay = self._replay
         moment = datetime.fromtimestamp(replay.ros_time * 1e-9, UTC)
         self._notes += [
-            f"{replay.time:.6f} s ({moment:%Y-%m-%d %H:%M:%S} UTC, ROS time "
+            f"{replay.rows.time:.6f} s ({moment:%Y-%m-%d %H:%M:%S} UTC, ROS time "
             f"{replay.ros_time * 1e-9:.6f}): {error}",
             *self._values(error),
             self._place(error),
-            f"--break-at {replay.time:.6f} stops there",
+            f"--break-at {replay.rows.time:.6f} stops there",
         ]
         return self._outcome(Status.DIFFERENT, "different, after what was identical")
 
@@ -229,7 +229,7 @@ class _Run:
 
     def _searched(self) -> Iterator[Path]:
         for path in self._others:
-            self._report(self._replay.time, self._journal.position, self._inputs)
+            self._report(self._replay.rows.time, self._journal.position, self._inputs)
             yield path
 
     def _place(self, error: BaseException) -> str:

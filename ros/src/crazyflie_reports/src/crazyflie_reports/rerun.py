@@ -1,5 +1,6 @@
 """Nodes run again, in a process without ROS, on what was recorded: in open or in closed loop."""
 
+import contextlib
 import heapq
 import math
 from collections import defaultdict
@@ -60,11 +61,28 @@ def interface(name: str, given: FlightInput) -> Interface:
     return Interface(transport.publisher_types, transport.subscriber_types, own)
 
 
+def remove_effects(given: FlightInput) -> None:
+    """Remove nodes that would act on more than messages, such as a driver on its vehicles."""
+    for name, path in list(given.classes.items()):
+        # One that is not there any more may not be chosen.
+        with contextlib.suppress(InputError):
+            if effects := _class(name, path).effects:
+                del given.classes[name]
+                given.remarks.append(f"{name} is not run again: it acts on {effects}")
+
+
 def _make(name, path):
+    made = _class(name, path)
+    if made.effects:
+        raise InputError(f"the node {name} acts on {made.effects}: it is not run again")
+    return made()
+
+
+def _class(name, path):
     try:
         made = load(path)
         if isinstance(made, type) and issubclass(made, Node):
-            return made()
+            return made
         reason = "it is not a class derived from Node"
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         reason = missing_module(error) or str(error)

@@ -32,7 +32,7 @@ from crazyflie_reports.figures import Figure, figures_of_motion
 from crazyflie_reports.flight_input import FlightInput, InputError
 from crazyflie_reports.flown_model import IDEAL, Explained, FlownModel, VehicleModel, explain
 from crazyflie_reports.laid_over import add_controls, lay_over
-from crazyflie_reports.rerun import TF, Interface, Rerun, interface
+from crazyflie_reports.rerun import TF, Interface, Rerun, interface, remove_effects
 from crazyflie_utils.journal.journal_file import JournalError
 from crazyflie_utils.parameters.declaration import ParameterError
 from crazyflie_utils.program import load
@@ -141,6 +141,7 @@ def _compare(options, out, place):
     if not journals:
         launch, *arguments = options.launch or (LAUNCH[is_driven],)
         given = flight_input.of_launch_file(launch, arguments, options.recording, namespace)
+    remove_effects(given)
     frame = _find_frame(given, log, namespace)
     interfaces = _interfaces(given, options)
     # What moves the vehicle is in the recording, unless a simulator did in the recorded process.

@@ -37,6 +37,10 @@ class Node(Generic[P]):
     #: What callbacks read that does not come through the handle, and is not in a journal (text).
     sources: ClassVar[str] = ""
 
+    #: What the node acts on outside of ROS, such as vehicles (text): it is run again from its
+    #: journal, where that is not there, and in no other way.
+    effects: ClassVar[str] = ""
+
     #: Whether a process with this node continues after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
 

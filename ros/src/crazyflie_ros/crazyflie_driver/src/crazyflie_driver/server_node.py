@@ -121,6 +121,8 @@ class CrazyflieServerNode(Node[CrazyflieServerParameters]):
     that has not received the broadcast is sent its own command.
     """
 
+    effects = "its vehicles, by their links"
+
     needed_in_flight = True
 
     def __init__(self) -> None:

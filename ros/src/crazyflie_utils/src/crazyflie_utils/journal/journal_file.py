@@ -96,6 +96,8 @@ class Kind(enum.IntEnum):
 
 #: Kinds that name things, and change nothing.
 NAMES = frozenset((Kind.CALLER, Kind.SUBSCRIBED, Kind.ADVERTISED, Kind.OFFERED))
+#: Size of the data of kinds that are a number (bytes).
+_SIZES = {int(kind): 8 for kind in (Kind.TIME, Kind.WALL, Kind.CLOCK)}
 INPUTS = frozenset(kind for kind in Kind if kind < Kind.TIME)
 
 
@@ -447,7 +449,7 @@ def _made(heads: NDArray[Any], data: bytes) -> Iterator[Row]:
     begin = len(data)
     for size, value, number, kind in heads.tolist():
         begin, end = begin - size, begin
-        if begin < 0:
+        if begin < 0 or size != _SIZES.get(kind, size):
             raise ValueError("the data of a row are missing")
         yield Row(Kind(kind), number, value, data[begin:end])
 

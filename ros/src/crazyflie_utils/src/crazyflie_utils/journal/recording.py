@@ -196,7 +196,10 @@ class Recorder:
 
     def _look_at_flags(self):
         for flag in list(self.flags.values()):
-            flag.look()
+            value = flag.read()
+            if value is not flag.value:
+                flag.value = value
+                self.row(Kind.PEERS, flag.number, value)
 
     def _check(self):
         """Write the checks of the messages that have none yet, and look at the wall clock."""
@@ -346,22 +349,14 @@ text_file.content = _content
 class _Flag:
     """A condition that callbacks read as it was when the recorder looked; changes are written."""
 
-    def __init__(self, recorder: Recorder, number: int, read: Condition):
-        self._recorder, self._read = recorder, read
-        self.number = number
-        self._executor, self._value = recorder.executor, False
+    def __init__(self, executor: Executor, number: int, read: Condition):
+        self.read, self.number, self.value = read, number, False
+        self._executor = executor
 
     def __call__(self) -> bool:
         if self._executor._runner == get_ident() or self._executor.is_in_turn:
-            return self._value
-        return self._read()
-
-    def look(self) -> None:
-        """Read the condition."""
-        value = self._read()
-        if value is not self._value:
-            self._value = value
-            self._recorder.row(Kind.PEERS, self.number, value)
+            return self.value
+        return self.read()
 
 
 class _RecordedSubscriber(ExternalSubscriber):
@@ -372,13 +367,10 @@ class _RecordedSubscriber(ExternalSubscriber):
         self.flag: _Flag
         self._recorder, self._number = recorder, number
         self._plain_type, self._deliver = plain, deliver
-        self._post = recorder.executor.post
+        #: Writes a message and passes it on, in its turn. Not a method: called for each message.
+        self.receive = partial(recorder.executor.post, self._pass_on)
         self._header: dict[str, str] | None = None
         self._origin = ORIGIN.pack(0)
-
-    def receive(self, message: Any) -> None:
-        """Write a message and pass it on, in its turn."""
-        self._post(self._pass_on, message)
 
     def _pass_on(self, message):
         header = getattr(message, "_connection_header", None)
@@ -423,7 +415,7 @@ class RecordingTransport(Transport):
 
     def _flag(self, read: Condition) -> _Flag:
         number = next(self._flags)
-        flag = self._recorder.flags[number] = _Flag(self._recorder, number, read)
+        flag = self._recorder.flags[number] = _Flag(self._recorder.executor, number, read)
         return flag
 
     def starting(self) -> AbstractContextManager[None]:

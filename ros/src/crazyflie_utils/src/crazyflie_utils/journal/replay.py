@@ -3,7 +3,6 @@
 import builtins
 import collections
 import json
-import math
 import struct
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -37,17 +36,7 @@ from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.tasks import Tasks
 from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQueue
 
-_U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
-
-
-def _number(layout, row):
-    """Return the number that is the data of a row."""
-    if len(row.data) != layout.size:
-        raise DifferenceError(
-            f"the journal is damaged: {row.kind.name} has {len(row.data)} bytes; expected "
-            f"{layout.size}"
-        )
-    return layout.unpack(row.data)[0]
+_U64, _MOMENT = struct.Struct("<Q"), struct.Struct("<d")
 
 
 class _ReplayExecutor(Executor):
@@ -160,14 +149,13 @@ class _ReplayClock(SteadyClock):
 
     def __init__(self, rows: Rows, executor: Executor):
         super().__init__()
-        #: now, wall_offset: Moment of the present input, and wall clock minus this clock (ns).
-        self.now = self.wall_offset = 0
-        self._rows, self._executor = rows, executor
+        self.now = 0  #: Moment of the present input (ns).
+        self.rows, self._executor = rows, executor
 
     def _read(self):
         if not self._executor.is_running_here:
-            row = self._rows.expect(Kind.TIME, 0, "reads the clock")
-            self.now = _number(_U64, row)
+            row = self.rows.expect(Kind.TIME, 0, "reads the clock")
+            (self.now,) = _U64.unpack(row.data)
         return self.now
 
     @override
@@ -176,10 +164,10 @@ class _ReplayClock(SteadyClock):
 
     @override
     def nanoseconds(self, moment: float | None = None) -> int:
-        now, row = self._read(), self._rows.next
+        now, row = self._read(), self.rows.next
         if row is not None and row.kind is Kind.WALL and row.number == 1:
-            self.wall_offset = _number(_I64, self._rows.take())
-        return (now if moment is None else round(moment * 1e9)) + self.wall_offset
+            self.rows.take()
+        return (now if moment is None else round(moment * 1e9)) + self.rows.wall_offset
 
 
 class _ReplayProcess(Process):
@@ -227,17 +215,11 @@ class _RosProcess(_ReplayProcess):
     def ros_time(self) -> int:
         """Return the ROS time of the present input (ns)."""
         if self.clock is self.machine:
-            return self.machine.now + self.machine.wall_offset
+            return self.machine.now + self.machine.rows.wall_offset
         return self.clock.nanoseconds()
 
-    @property
-    def wall_offset(self) -> int:
-        """Wall clock minus the machine's (ns)."""
-        return self.machine.wall_offset
-
-    @wall_offset.setter
-    def wall_offset(self, offset: int) -> None:
-        self.machine.wall_offset = offset
+    def set_wall(self, offset: int) -> None:
+        """Do nothing: the clock reads the rows."""
 
     def find_due(self) -> None:
         """Find the timers that are due now by the machine's clock."""
@@ -259,13 +241,8 @@ class _OfflineProcess(_ReplayProcess, OfflineProcess):
         """Return the ROS time of the present input (ns)."""
         return self.clock.nanoseconds()
 
-    @property
-    def wall_offset(self) -> int:
-        """Wall clock minus the process's (ns)."""
-        return round(self.clock.wall_offset * 1e9)
-
-    @wall_offset.setter
-    def wall_offset(self, offset: int) -> None:
+    def set_wall(self, offset: int) -> None:
+        """Set the wall clock minus the process's (ns)."""
         self.clock.wall_offset = offset * 1e-9
 
     def find_due(self) -> None:
@@ -288,7 +265,6 @@ class Replay:
         self.input: Row | None = None  #: The input that is processed, or was last.
         self._executor = _ReplayExecutor()
         header = journal.header
-        self._us = self._begin = header["us"]
         self.process: _RosProcess | _OfflineProcess
         if header["clock"] == "manual":
             self.process = _OfflineProcess(self.transport, header["start"], self._executor)
@@ -304,27 +280,6 @@ class Replay:
         self.process.tasks.end()
 
     @property
-    def time(self) -> float:
-        """Time of the present input since the process was started (s).
-
-        It is that of the machine's clock, or of the manual one.
-        """
-        if isinstance(self.process, _OfflineProcess):
-            return self.process.clock.time() - float(self.journal.header["start"])
-        return float(self._us - self._begin) * 1e-6
-
-    @property
-    def next_time(self) -> float:
-        """`time` of the next input (s); infinity if there is none, or something else is next."""
-        row = self.rows.next
-        if row is None or row.kind not in INPUTS:
-            return math.inf
-        if row.kind is Kind.CLOCK and row.number == 0 and len(row.data) == _MOMENT.size:
-            return float(_MOMENT.unpack(row.data)[0]) - float(self.journal.header["start"])
-        is_offline = isinstance(self.process, _OfflineProcess)
-        return self.time + (0.0 if is_offline else row.value * 1e-6)
-
-    @property
     def ros_time(self) -> int:
         """ROS time of the present input (ns)."""
         return self.process.ros_time()
@@ -332,7 +287,7 @@ class Replay:
     @property
     def wall_time(self) -> int:
         """Wall time of the present input (ns)."""
-        return self._us * 1000 + self.process.wall_offset
+        return self.rows.us * 1000 + self.rows.wall_offset
 
     @property
     def input_name(self) -> str:
@@ -387,7 +342,8 @@ class Replay:
         if row is None:
             return False
         if row.kind is Kind.WALL:
-            self.process.wall_offset = _number(_I64, self.rows.take())
+            self.rows.take()
+            self.process.set_wall(self.rows.wall_offset)
             return True
         if row.kind is Kind.PEERS and row.number in self.transport.flags:
             self.transport.flags[row.number].value = bool(self.rows.take().value)
@@ -395,8 +351,7 @@ class Replay:
         if row.kind not in INPUTS:
             raise DifferenceError(f"now the callback has ended; then {self.rows.describe(row)}")
         self.input = self.rows.take()
-        self._us += row.value
-        self.process.move_to(self._us * 1000)
+        self.process.move_to(self.rows.us * 1000)
         try:
             self._handlers[row.kind](self, row)
         except JournalError:
@@ -404,8 +359,8 @@ class Replay:
         except Exception as error:
             # Those of nodes do not come here.
             raise JournalError(
-                f"{self.journal.path}: at {self.time:.3f} s, {row.kind.name} {row.number} does "
-                f"not fit these nodes: {error!r}"
+                f"{self.journal.path}: at {self.rows.time:.3f} s, {row.kind.name} {row.number} "
+                f"does not fit these nodes: {error!r}"
             ) from None
         return True
 
@@ -483,7 +438,7 @@ class Replay:
         else:
             node, function, arguments = known
             raise JournalError(
-                f"{self.journal.path}: at {self.time:.3f} s, a thread of {node} has called "
+                f"{self.journal.path}: at {self.rows.time:.3f} s, a thread of {node} has called "
                 f"{function}{arguments}, which cannot be repeated"
             )
 
@@ -499,7 +454,7 @@ class Replay:
     def _clock(self, row):
         offline = self._expect_offline()
         set_clock = (offline.set_clock, offline.set_machine_clock)[row.number]
-        set_clock(_number(_MOMENT, row))
+        set_clock(*_MOMENT.unpack(row.data))
 
     def _launch(self, row):
         name, path = json.loads(row.data)

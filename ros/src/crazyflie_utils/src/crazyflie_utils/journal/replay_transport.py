@@ -3,6 +3,8 @@
 import builtins
 import collections
 import json
+import math
+import struct
 import zlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -38,6 +40,8 @@ from crazyflie_utils.topics import (
     never,
 )
 
+_I64, _MOMENT = struct.Struct("<q"), struct.Struct("<d")
+
 
 class DifferenceError(BaseException):
     """The process did something else than what was recorded; the text says what.
@@ -56,10 +60,15 @@ class EndError(BaseException):
 
 
 class Rows:
-    """The rows of a journal, one after the other."""
+    """The rows of a journal, one after the other, and the time of the last one."""
 
     def __init__(self, journal: Journal):
         self._path, self._rows = journal.path, journal.rows()
+        self._header = journal.header
+        self.us: int = journal.header["us"]  #: The machine's clock, us.
+        self.wall_offset = 0  #: Wall clock minus the process's own, ns.
+        self.moment: float = journal.header["start"]  #: A clock that is set by hand, s.
+        self.inputs = 0  #: Number of inputs that were taken.
         #: Numbers to names, by kind of `NAMES`.
         self.names: dict[Kind, dict[int, list[str]]] = {kind: {} for kind in NAMES}
         self._headers: dict[int, dict[str, str]] = {}
@@ -86,8 +95,34 @@ class Rows:
         if row is None:
             raise EndError
         self.counts[row.kind] += 1
+        if row.kind in INPUTS:
+            self.us += row.value
+            self.inputs += 1
+        if row.kind is Kind.WALL:
+            (self.wall_offset,) = _I64.unpack(row.data)
+        elif row.kind is Kind.CLOCK and row.number == 0:
+            (self.moment,) = _MOMENT.unpack(row.data)
         self._advance()
         return row
+
+    @property
+    def time(self) -> float:
+        """Time since the start (s), by the machine's clock, or by the one that is set by hand."""
+        if self._header["clock"] == "manual":
+            return self.moment - float(self._header["start"])
+        return float(self.us - self._header["us"]) * 1e-6
+
+    @property
+    def next_time(self) -> float:
+        """`time` of the next input (s); infinity if there is none, or something else is next."""
+        row = self.next
+        if row is None or row.kind not in INPUTS:
+            return math.inf
+        if self._header["clock"] != "manual":
+            return self.time + row.value * 1e-6
+        if row.kind is Kind.CLOCK and row.number == 0 and len(row.data) == _MOMENT.size:
+            return float(_MOMENT.unpack(row.data)[0]) - float(self._header["start"])
+        return self.time
 
     def connection(self, number: int) -> dict[str, str] | None:
         """Return the header that all messages of a connection share, or None."""

@@ -104,7 +104,7 @@ def test_a_vehicle_that_is_lost_early_in_its_climb_is_kept_by_its_own_thrust_of_
     """Of a vehicle that hovers at less, the filter believed g: it climbed without a control."""
     network = scaled(hover)
     network.call("/takeoff")
-    network.advance_until(lambda: network.process("filter").node._facts.flown is not None)
+    network.advance_until(lambda: network.process("filter").node._memory.passed is not None)
     network.advance(0.1)
     network.vehicle_node.sees = camera
     network.kill("controller")

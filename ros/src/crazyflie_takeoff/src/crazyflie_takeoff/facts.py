@@ -193,7 +193,7 @@ class Facts:
         motion = self.seen
         speed = None if motion is None else motion.velocity[2]
         # A late control fades.
-        is_late = self.silence > 0.5 * self.hold
+        is_late = self.needs_controller and self.silence > 0.5 * self.hold
         if self.flown is None or is_late or not 0.0 < step < LEARNING_STEP:
             if step != 0.0:
                 self._hover_mean.skip(speed)

@@ -211,6 +211,7 @@ def _pass_takeoff(memory, facts):
 def _takeoff_control(memory, facts, heard):
     """Return a takeoff control, or what is left of it within the limits."""
     memory.takeoff = _limited(facts, heard.setpoint, 0.0, is_ramp=True)
+    _learn_from(facts, memory.takeoff)
     return heard.control if memory.takeoff == heard.setpoint else memory.takeoff
 
 
@@ -301,7 +302,17 @@ def _late_takeoff(memory, facts):
     """
     age = facts.takeoff_age
     is_late = 0.5 * facts.hold < age < math.inf and memory.takeoff.thrust > facts.hover
-    return _faded(facts, memory.takeoff, age) if is_late else None
+    if not is_late:
+        return None
+    faded = _faded(facts, memory.takeoff, age)
+    _learn_from(facts, faded)
+    return faded
+
+
+def _learn_from(facts, control):
+    """Learn from a control of a takeoff: its server may end before it has said the weight."""
+    is_seen = facts.flight is FlightState.TAKING_OFF and facts.seen is not None
+    facts.flown = control if is_seen else None
 
 
 def _faded(facts, setpoint, age):

@@ -2,8 +2,8 @@
 
 import pytest
 
+from crazyflie_dashboard.live_parameters import of_firmware, parsed
 from crazyflie_dashboard.page_data import ParameterInfo
-from crazyflie_dashboard.parameters import of_firmware, parsed
 from crazyflie_utils.refusal import RefusalError
 
 TREE = {

@@ -3,7 +3,7 @@
 import pytest
 from simulated_fleet import Swarm
 
-from crazyflie_driver.parameters import _OWN_TOPICS
+from crazyflie_driver.driver_parameters import _OWN_TOPICS
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import RESERVED_NAMES
 from crazyflie_fleet.virtual_fleet_process import make_nodes

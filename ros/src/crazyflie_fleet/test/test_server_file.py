@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_driver.parameters import CrazyflieServerParameters
+from crazyflie_driver.driver_parameters import CrazyflieServerParameters
 from crazyflie_fleet import driver_process, mocap_process
 from crazyflie_utils import ParameterError
 from crazyflie_utils.testing import FakeProcess

@@ -15,6 +15,7 @@ from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.emergency import EmergencyLane
 from crazyflie_dashboard.graph_model import GraphModel
 from crazyflie_dashboard.history import Event
+from crazyflie_dashboard.live_parameters import LiveParameters
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import examine
 from crazyflie_dashboard.page_data import (
@@ -28,7 +29,6 @@ from crazyflie_dashboard.page_data import (
     words,
 )
 from crazyflie_dashboard.page_state import PageState
-from crazyflie_dashboard.parameters import LiveParameters
 from crazyflie_dashboard.plots import fields_of
 from crazyflie_dashboard.progress import Commands, Progress
 from crazyflie_dashboard.recording import Recorded, Recording

@@ -8,7 +8,7 @@ from std_msgs.msg import Float32
 from typing_extensions import override
 
 from crazyflie_driver.add_node import command_again
-from crazyflie_driver.parameters import (
+from crazyflie_driver.driver_parameters import (
     ADD,
     POSITIONING_PARAMETER,
     STANDARD_TOPICS,

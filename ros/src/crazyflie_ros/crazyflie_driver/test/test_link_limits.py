@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_driver.parameters import LinkLimits
+from crazyflie_driver.driver_parameters import LinkLimits
 from crazyflie_driver.status import findings
 from crazyflie_msgs.msg import VehicleStatus
 

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from crazyflie_driver.parameters import STANDARD_TOPICS
+from crazyflie_driver.driver_parameters import STANDARD_TOPICS
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
 

@@ -10,12 +10,12 @@ from crazyflie_driver.setpoint_gate import (
     STREAM_PAUSE,
     TRANSITIONS,
     Block,
-    Control,
     GateEvent,
     SetpointGate,
+    SetpointKind,
 )
 
-ZERO, THRUST, REFERENCE = Control.ZERO_THRUST, Control.THRUST, Control.REFERENCE
+ZERO, THRUST, REFERENCE = SetpointKind.ZERO_THRUST, SetpointKind.THRUST, SetpointKind.REFERENCE
 
 
 def opened():

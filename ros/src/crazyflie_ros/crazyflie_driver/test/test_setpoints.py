@@ -7,8 +7,8 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty as EmptyMessage
 
+from crazyflie_driver.driver_parameters import INPUT_TOPICS
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_driver.parameters import INPUT_TOPICS
 from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_driver.setpoint_topics import CMD_STOP, CMD_VEL, EXTERNAL, SETPOINTS
 

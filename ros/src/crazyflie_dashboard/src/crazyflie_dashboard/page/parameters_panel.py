@@ -5,9 +5,9 @@ import asyncio
 from nicegui import ui
 from nicegui.elements.mixins.value_element import ValueElement
 
+from crazyflie_dashboard.live_parameters import range_of
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.page_data import ParameterInfo
-from crazyflie_dashboard.parameters import range_of
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
 

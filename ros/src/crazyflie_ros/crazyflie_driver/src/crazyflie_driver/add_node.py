@@ -5,7 +5,7 @@ from functools import partial
 
 from typing_extensions import override
 
-from crazyflie_driver.parameters import (
+from crazyflie_driver.driver_parameters import (
     ADD,
     KALMAN_FILTER,
     POSITIONING_PARAMETER,

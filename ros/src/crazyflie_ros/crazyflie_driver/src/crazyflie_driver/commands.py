@@ -106,7 +106,7 @@ _LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they com
 
 
 @dataclass(eq=False)
-class FlightState:
+class CommandedFlight:
     """Distinguish flights by the high-level commander from other states with FLYING.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then

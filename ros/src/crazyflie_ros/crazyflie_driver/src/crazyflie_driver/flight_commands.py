@@ -13,14 +13,14 @@ from crazyflie_driver.commands import (
     STOP,
     TAKEOFF,
     Command,
-    FlightState,
+    CommandedFlight,
     Need,
 )
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import STEP, STEP_TIME, Charge, Next, Touchdown, landing_duration
 from crazyflie_driver.positioning import PATIENCE
-from crazyflie_driver.setpoint_gate import GateEvent
-from crazyflie_driver.setpoint_topics import Control, SetpointTopics
+from crazyflie_driver.setpoint_gate import GateEvent, SetpointKind
+from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle, Job
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_link.supervisor import Supervisor
@@ -86,7 +86,7 @@ class FlightCommands:
     _vehicle: BaseVehicle
     _log: LogTopics
     _setpoints: SetpointTopics
-    _flight: FlightState
+    _flight: CommandedFlight
     # Validity of the last setpoint, ms, in a notice that has not been sent yet.
     _pending_notify: int | None = None
     _notify_timer: Timer | None = None
@@ -281,7 +281,7 @@ class FlightCommands:
     def _check_estimate(self, command):
         # Where a flight by the estimate goes on, a landing by it is the best that is left.
         problem = self._log.estimate_problem()
-        if problem and command.name == LAND and self._setpoints.control is not Control.THRUST:
+        if problem and command.name == LAND and self._setpoints.control is not SetpointKind.THRUST:
             self._vehicle.warn(f"land may end elsewhere: {problem}")
         elif problem:
             raise ServiceError(f"no {command.name}: {problem}")
@@ -473,7 +473,7 @@ class FlightCommands:
         if self.is_high_level_flight_active:
             return True
         is_flying = SupervisorState.FLYING in state
-        return is_flying and self._setpoints.control is Control.REFERENCE
+        return is_flying and self._setpoints.control is SetpointKind.REFERENCE
 
     def _is_position_lost(self):
         positioning = self._log.positioning

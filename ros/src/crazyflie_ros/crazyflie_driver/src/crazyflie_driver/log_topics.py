@@ -10,9 +10,9 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Transform, Transfo
 from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header, String
 
+from crazyflie_driver.driver_parameters import POSITIONING_TOPIC
 from crazyflie_driver.monitors import VARIANCES, VARIANCES_PERIOD_MS, BatteryMonitor, Variances
 from crazyflie_driver.msg import GenericLogData, crtpPacket
-from crazyflie_driver.parameters import POSITIONING_TOPIC
 from crazyflie_driver.positioning import (
     ESTIMATE,
     ESTIMATOR,

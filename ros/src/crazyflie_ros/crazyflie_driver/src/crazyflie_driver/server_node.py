@@ -13,14 +13,14 @@ from std_srvs import srv as std_srvs
 from typing_extensions import override
 
 from crazyflie_driver.commands import SERVICE_TYPES, Command, Need, requested
-from crazyflie_driver.flight_commands import Reason
-from crazyflie_driver.parameters import (
+from crazyflie_driver.driver_parameters import (
     ADD,
     REMOVE,
     BroadcastParameters,
     CrazyflieServerParameters,
     VehicleParameters,
 )
+from crazyflie_driver.flight_commands import Reason
 from crazyflie_driver.setpoint_topics import CMD_VEL
 from crazyflie_driver.srv import AddCrazyflie, RemoveCrazyflie
 from crazyflie_driver.status import diagnostics

@@ -11,7 +11,7 @@ from typing import Any
 from std_srvs.srv import Empty, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
-from crazyflie_driver.commands import SERVICE_TYPES, FlightState, requested
+from crazyflie_driver.commands import SERVICE_TYPES, CommandedFlight, requested
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.setpoint_gate import GateEvent
 from crazyflie_driver.trajectory_messages import from_message
@@ -201,7 +201,7 @@ class VehicleServices:
     """
 
     _vehicle: BaseVehicle
-    _flight: FlightState
+    _flight: CommandedFlight
     _commands: FlightCommands
     _mirror: ParameterMirror
     _latch_emergency: Callable[[], None]

@@ -14,8 +14,8 @@ STREAM_PAUSE = 1.0
 OVERLAP = 0.5
 
 
-class Control(enum.Enum):
-    """Kind of a command."""
+class SetpointKind(enum.Enum):
+    """Kind of a setpoint, or of what has replaced setpoints."""
 
     HIGH_LEVEL = enum.auto()  #: Or the notice that setpoints stop.
     ENDED = enum.auto()  #: The same notice, after zero thrust.
@@ -124,7 +124,7 @@ class SetpointGate:
         self._commands = 0
         # When setpoints could come first, when the latest one came, and of which kind it was.
         self._begin, self._latest = math.inf, -math.inf
-        self._control = Control.ZERO_THRUST
+        self._control = SetpointKind.ZERO_THRUST
         self._high_level_since: float | None = None
         self._stopped_since: float | None = None
 
@@ -172,20 +172,20 @@ class SetpointGate:
 
         The firmware obeys the latest setpoint for `OFF_AGE`. One that was blocked counts, too.
         """
-        if self._control is Control.ZERO_THRUST or now - self._latest > OFF_AGE:
+        if self._control is SetpointKind.ZERO_THRUST or now - self._latest > OFF_AGE:
             return ""
         return (
             "setpoints come that would start its motors at once: end them (call /land if a "
             f"takeoff server sends them), and arm it after zero thrust, or {OFF_AGE:g} s later"
         )
 
-    def refusal(self, now: float, control: Control) -> str:
+    def refusal(self, now: float, control: SetpointKind) -> str:
         """Return why a setpoint must not be sent; empty if it may."""
-        is_zero = control is Control.ZERO_THRUST
+        is_zero = control is SetpointKind.ZERO_THRUST
         has_paused = now - max(self._begin, self._latest) > STREAM_PAUSE
         self._latest, self._control = now, control
         # References do not make a vehicle leap.
-        if is_zero or (has_paused and control is Control.REFERENCE):
+        if is_zero or (has_paused and control is SetpointKind.REFERENCE):
             self.handle(GateEvent.GROUND_COMMANDED)
         if (is_zero or has_paused) and not self._blocks & ~(_ON_TRIAL | _ADDED):
             self.handle(GateEvent.STREAM_BEGUN)

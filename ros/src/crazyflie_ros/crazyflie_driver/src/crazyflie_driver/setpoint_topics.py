@@ -14,7 +14,7 @@ from std_msgs.msg import Empty
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.monitors import LIFT_LIMIT, MAX_TURN, MIN_CLIMB, LiftWatch
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_driver.setpoint_gate import Control, GateEvent
+from crazyflie_driver.setpoint_gate import GateEvent, SetpointKind
 from crazyflie_driver.thrust_fade import FADE_TIME, ThrustFade
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.errors import CrazyflieError
@@ -129,7 +129,7 @@ class SetpointTopics:
     _vehicle: BaseVehicle
     _log: LogTopics
     #: The kind of command that the vehicle was sent last.
-    control: Control = Control.HIGH_LEVEL
+    control: SetpointKind = SetpointKind.HIGH_LEVEL
     ignored: int = 0  #: Setpoints that were not sent.
     #: When the latest high-level command will have been carried out, s; setpoints until then are
     #: warned of.
@@ -161,7 +161,7 @@ class SetpointTopics:
     @property
     def is_streaming(self) -> bool:
         """Whether setpoints were sent since the last notice that they stop."""
-        return self.control not in (Control.HIGH_LEVEL, Control.ENDED)
+        return self.control not in (SetpointKind.HIGH_LEVEL, SetpointKind.ENDED)
 
     @property
     def may_have_priority(self) -> bool:
@@ -180,7 +180,7 @@ class SetpointTopics:
     @property
     def runs_motors(self) -> bool:
         """Whether the latest of them runs the motors."""
-        return self.control in (Control.THRUST, Control.REFERENCE)
+        return self.control in (SetpointKind.THRUST, SetpointKind.REFERENCE)
 
     @property
     def is_flown_on_thrust(self) -> bool:
@@ -189,7 +189,7 @@ class SetpointTopics:
         may_fly = state is None or SupervisorState.FLYING in state
         may_fly = may_fly and not self._vehicle.gate.is_emergency
         is_streamed = self._vehicle.handle.time() - self.last_time < LEVEL_AGE
-        return may_fly and is_streamed and self.control is Control.THRUST
+        return may_fly and is_streamed and self.control is SetpointKind.THRUST
 
     @property
     def last_time(self) -> float:
@@ -203,7 +203,7 @@ class SetpointTopics:
 
     def can_land_autonomously(self) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs show."""
-        if self.control is not Control.THRUST:
+        if self.control is not SetpointKind.THRUST:
             return True
         is_fed = self._vehicle.handle.time() - self._external_time <= _RATE_WINDOW
         return is_fed and not self._log.estimate_problem()
@@ -241,7 +241,7 @@ class SetpointTopics:
             self._setpoints_stopped()
 
     def _setpoints_stopped(self):
-        self.control = Control.HIGH_LEVEL
+        self.control = SetpointKind.HIGH_LEVEL
         self._lift.end()
 
     def check_lift(self) -> None:
@@ -311,8 +311,8 @@ class SetpointTopics:
     def _on_setpoint(self, name, sender, message):
         now, gate = self._vehicle.handle.time(), self._vehicle.gate
         at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
-        moving = Control.THRUST if name == CMD_VEL else Control.REFERENCE
-        control = Control.ZERO_THRUST if at_rest else moving
+        moving = SetpointKind.THRUST if name == CMD_VEL else SetpointKind.REFERENCE
+        control = SetpointKind.ZERO_THRUST if at_rest else moving
         height, yaw = sender.height_and_yaw(message)
         if height is not None and height < MIN_CLIMB:
             gate.handle(GateEvent.GROUND_COMMANDED)
@@ -342,7 +342,7 @@ class SetpointTopics:
         # Returns why a setpoint would lead the vehicle elsewhere. A flight by such setpoints goes
         # on: without them the vehicle would fall.
         problem = self._log.estimate_problem() if name in SETPOINTS else ""
-        if problem and self.control is Control.REFERENCE and self._log.is_flying:
+        if problem and self.control is SetpointKind.REFERENCE and self._log.is_flying:
             self._warn(f"{name} in flight: {problem}", key="estimate")
             return ""
         return problem
@@ -359,12 +359,12 @@ class SetpointTopics:
         now = self._vehicle.handle.time()
         # Without a link, which its state shows; it is tried again.
         with contextlib.suppress(CrazyflieError):
-            if self.control is Control.ZERO_THRUST and now - self.last_time > _REST:
+            if self.control is SetpointKind.ZERO_THRUST and now - self.last_time > _REST:
                 self.notify_setpoints_stop()
-                self.control, self._end_time = Control.ENDED, now
-            elif self.control is Control.ENDED and self._may_have_lost_notice:
+                self.control, self._end_time = SetpointKind.ENDED, now
+            elif self.control is SetpointKind.ENDED and self._may_have_lost_notice:
                 self._repeat_notice(now)
-            elif self.control is Control.THRUST and self._log.is_flying:
+            elif self.control is SetpointKind.THRUST and self._log.is_flying:
                 self._send_fading(now)
 
     def _repeat_notice(self, now):

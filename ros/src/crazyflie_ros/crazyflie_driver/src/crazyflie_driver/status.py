@@ -8,14 +8,14 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from std_msgs.msg import Bool, Header, String
 
-from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.monitors import Charge, battery_words
-from crazyflie_driver.parameters import (
+from crazyflie_driver.driver_parameters import (
     CONNECTED_TOPIC,
     STATUS_TOPIC,
     VEHICLE_STATUS_TOPIC,
     LinkLimits,
 )
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.monitors import Charge, battery_words
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_base import BaseVehicle
 from crazyflie_link.crazyflie import LinkState

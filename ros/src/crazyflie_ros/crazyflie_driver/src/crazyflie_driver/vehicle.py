@@ -3,14 +3,14 @@
 import dataclasses
 from concurrent.futures import Future, wait
 
-from crazyflie_driver.commands import FlightState
-from crazyflie_driver.flight_commands import FlightCommands, Reason
-from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.parameters import (
+from crazyflie_driver.commands import CommandedFlight
+from crazyflie_driver.driver_parameters import (
     POSITIONING_PARAMETER,
     CrazyflieServerParameters,
     VehicleParameters,
 )
+from crazyflie_driver.flight_commands import FlightCommands, Reason
+from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.positioning import MOCAP, SOURCES
 from crazyflie_driver.services import ParameterMirror, VehicleServices
 from crazyflie_driver.setpoint_gate import GateEvent, SetpointGate
@@ -77,7 +77,7 @@ class DriverVehicle(BaseVehicle):
         self._deliver_link_state = self.delivery.outlet(self._on_link_state)
         self.log = LogTopics(self, self._on_log)
         self.setpoints = SetpointTopics(self, self.log)
-        self.flight = FlightState(self, self.log, self.setpoints)
+        self.flight = CommandedFlight(self, self.log, self.setpoints)
         self.status = StatusPublisher(self, self.log, self.setpoints)
         self.commands = FlightCommands(self, self.log, self.setpoints, self.flight)
         self._mirror = ParameterMirror(

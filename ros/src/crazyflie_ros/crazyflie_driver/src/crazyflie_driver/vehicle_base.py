@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
-from crazyflie_driver.parameters import CrazyflieServerParameters, VehicleParameters
+from crazyflie_driver.driver_parameters import CrazyflieServerParameters, VehicleParameters
 from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_link.errors import CrazyflieError, LinkLostError, NoReplyError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError

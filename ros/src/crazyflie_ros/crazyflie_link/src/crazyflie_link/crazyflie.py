@@ -25,11 +25,11 @@ from crazyflie_link.errors import (
     ValueRangeError,
     explain,
 )
+from crazyflie_link.firmware_parameters import FirmwareParameters
 from crazyflie_link.high_level import HighLevel, Trajectories
 from crazyflie_link.link import LOG_DATA, Link, LinkHealth, LinkTimeouts, OnPacket
 from crazyflie_link.localization import Lighthouse, Localization
 from crazyflie_link.log import Log, LogBlock
-from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.setpoints import Setpoints
 from crazyflie_link.supervisor import EmergencyStop, Supervisor
 

@@ -33,8 +33,8 @@ from crazyflie_link.errors import (
     RefusedError,
     ValueRangeError,
 )
+from crazyflie_link.firmware_parameters import FirmwareParameters
 from crazyflie_link.link import Link
-from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.subsystem import (
     Subsystem,
     check_finite,

@@ -280,7 +280,7 @@ class LiveRig:
             )
         end = time.monotonic() + _CONVERGENCE_LIMIT
         # What has not converged then is named by the doctor.
-        while variances.problem() and time.monotonic() < end:
+        while (not variances.are_enough or variances.problem()) and time.monotonic() < end:
             time.sleep(_POLL)
 
     def run(self, duration: float) -> None:

@@ -146,6 +146,17 @@ def test_diagnostics_are_sentences_and_the_log_has_levels(fleet):
     assert fleet.dashboard.scene().sentences == ()
 
 
+def test_a_vehicle_whose_fence_is_not_certain_says_so(fleet):
+    """On its card, as long as it has nothing else to say."""
+    name, text = "cf2/geofence: certificate", "the box is not certain: disturbance along x"
+    for level in (DiagnosticStatus.WARN, DiagnosticStatus.OK):
+        status = [DiagnosticStatus(level, name, text, "", [])]
+        fleet.process.publish("/diagnostics", DiagnosticArray(status=status))
+        fleet.process.advance(0.05)
+        said = [each.reason == text for each in fleet.dashboard.scene().vehicles.values()]
+        assert said == [False, level == DiagnosticStatus.WARN, False]
+
+
 def test_without_frames_poses_come_from_the_topics_of_a_vehicle(fleet):
     fleet.graph = Graph({"/bird/pose": "geometry_msgs/PoseStamped"})
     fleet.process.advance(8.0)

@@ -814,6 +814,21 @@ def test_the_page_is_light_or_dark_as_the_system_is(browser, driver):
     has("dark")
 
 
+def test_all_vehicles_are_in_view_when_the_page_is_loaded(browser, driver, server):
+    places = [(x, y, 1.0) for x in (-6.0, 6.0) for y in (-6.0, 6.0)]
+    server.dashboard.set_vehicles(*(vehicle(f"cf{k}", *p) for k, p in enumerate(places)))
+    driver.get(server.url)
+
+    def are_in_view():
+        left, top, width, height = (
+            browser.find(".scene").rect[k] for k in ("x", "y", "width", "height")
+        )
+        seen = [browser.in_scene("screen({}, {}, {})".format(*place)) for place in places]
+        return all(left < x < left + width and top < y < top + height for x, y in seen)
+
+    wait_for(are_in_view, "all four in view", 15.0)
+
+
 def test_the_bar_has_the_steps_of_a_mission(browser, server):
     steps = (Step("takeoff: cf1", 2.0, "done"), Step("go_to: cf1", 4.0, "now"))
     server.dashboard.set_vehicles(

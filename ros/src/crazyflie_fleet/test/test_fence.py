@@ -5,7 +5,11 @@ import math
 import pytest
 from simulated_fleet import NODES, Swarm
 
+from crazyflie_fleet import fleet_file
+from crazyflie_fleet.fleet_process import make_nodes
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_utils import ParameterError
+from crazyflie_utils.testing import FakeProcess
 
 SIDE = 1.0  #: Of the box, to each side of the first vehicle (m).
 BOX = {
@@ -55,3 +59,27 @@ def test_each_vehicle_has_half_of_the_room_between_them(together):
     assert 2.0 * buffer < nearest < 2.0 * buffer + 0.1
     # The separation of references had nothing to do.
     assert [each.data for each in swarm.process.published("/fleet/waiting")] == [""]
+
+
+def test_a_fleet_file_asks_for_fences(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text("fence: true\nrobots:\n  cf1: {initial_position: [0, 0, 0]}\n")
+    swarm = Swarm({**NODES, "geofence": BOX}, fleet={"file": str(file)})
+    assert {"/cf1/geofence", "/cf1/control_merger"} <= set(swarm.nodes)
+    filtered = swarm.process.transport.get_param("/cf1/takeoff_control_filter/topics")
+    assert filtered["commanded_control"] == "control/merged"
+    file.write_text("fence: maybe\nrobots:\n  cf1: {initial_position: [0, 0, 0]}\n")
+    with pytest.raises(ParameterError, match=r"fleet.yaml:1: fence is 'maybe'; expected true"):
+        fleet_file.load(file)
+
+
+@pytest.mark.parametrize(("n", "warned"), [(21, False), (22, True)])
+def test_more_vehicles_than_fences_keep_apart_are_named(n, warned):
+    process = FakeProcess()
+    parameters = {"simulated": True, "fence": True, "fleet": {"n": n}}
+    process.transport.set_param("/fleet", {**parameters, "nodes": {**NODES, "geofence": BOX}})
+    make_nodes(process.handle("/fleet"))
+    others = process.transport.get_param("/cf1/geofence/topics/others")
+    assert len(others) == (0 if warned else n - 1)
+    [*said] = [text for text in process.logged("warn") if "do not keep them apart" in text]
+    assert [f"the fences of {n} vehicles" in text for text in said] == [True] * warned

@@ -163,6 +163,24 @@ def test_a_fence_that_is_switched_off_has_no_box():
     assert flight.flies
 
 
+@pytest.mark.parametrize("controller", ["position_velocity_yaw", "full_state"])
+def test_another_controller_does_not_leave_the_box_either(controller):
+    """The fence has the state of 7 numbers, the controller its own."""
+    flight = FencedFlight(controller=controller, dynamics="quadrotor")
+    flight.take_off()
+    farthest = 0.0
+    for x in (1.0, 1.8, 2.6):
+        flight.refer(x, 0.0, 1.0)
+        for _ in range(40):
+            flight.graph.advance(0.1)
+            farthest = max(farthest, flight.position[0])
+    assert 1.4 < farthest < 1.5
+    assert flight.flies
+    flight.refer(1.0, 0.0, 1.0)
+    flight.graph.advance(8.0)
+    assert flight.position == pytest.approx((1.0, 0.0, 1.0), abs=0.1)
+
+
 def test_flown_straight_at_a_pillar_it_stops_in_front_of_it():
     flight = FencedFlight("sw_obstacles")
     flight.take_off()

@@ -16,7 +16,7 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
 LOWER, UPPER = (-1.5, -1.0, 0.3), (1.5, 1.2, 2.5)
-AXES = bounds.axes(bounds.OF_TYPES, 1.4, 2.0, 0.01, 0.01)
+AXES = bounds.axes(bounds.load("cf21"), 1.4, 2.0, 0.01, 0.01)
 MIDDLE = (0.0, 0.1, 1.4)
 AT_REST = (0.0, 0.0, 0.0)
 HOVER = (0.0, 0.0, 0.3, GRAVITY)
@@ -154,7 +154,7 @@ def test_pressed_against_ceiling_or_floor_it_stays_within_3_cm(up):
 
 
 def test_near_a_wall_a_control_that_is_safe_is_passed_bit_for_bit():
-    position = (UPPER[0] - 0.07, 0.1, 1.4)
+    position = (UPPER[0] - 0.05, 0.1, 1.4)
     control, priority = hovering().control(0.0, position, AT_REST, 0.0, HOVER)
     # The next one, which may come before the fence's answer to it, need not be.
     assert (control, priority) == (HOVER, 1.0)
@@ -170,6 +170,9 @@ def test_it_does_not_chatter_at_the_wall():
 
 class Flight:
     """The vehicle of the theorem in three axes, its fence, and a merger that is a period late.
+
+    The merger is that of the C++ workspace: it answers each regular control with (1 - p) of it and
+    p of the prioritised one, the last that has come.
 
     Errors, disturbance and lateness are drawn from ``draw`` (between -1 and 1), in units of bounds.
     """
@@ -202,9 +205,9 @@ class Flight:
                 (self.velocity, "velocity_error"),
             )
         ]
-        # The merger has the priority of the state before.
-        control, priority = self.prior
-        final = control if priority else regular
+        control, p = self.prior
+        final = tuple((1.0 - p) * r + p * c for r, c in zip(regular, control, strict=True))
+        assert final == (control if p else regular)
         self.prior = self.fence.control(self.time, *measured, self.yaw, regular)
         self.fence.sent(self.time, final, self.yaw)
         self.pending.append(final)

@@ -56,7 +56,7 @@ def test_answers_a_state_with_what_the_fence_says(process):
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
     [message] = process.published("/control/geofence")
-    axes = bounds.axes(bounds.OF_TYPES, 1.4, 2.0, 0.01, 0.01)
+    axes = bounds.axes(bounds.load("cf21"), 1.4, 2.0, 0.01, 0.01)
     fence = Geofence((-1.0, -2.0, 0.0), (2.0, 1.0, 3.0), axes, bounds.max_thrust("cf21"))
     control, priority = fence.control(0.0, STATE[:3], STATE[3:6], STATE[6], REGULAR)
     np.testing.assert_array_equal(to_vector(message.control.control), control)
@@ -100,8 +100,8 @@ def test_topics_and_box_are_required(name):
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("box/max/x", -0.5, "at least -0.2201 m: the proof needs 0.78 m between the walls"),
-        ("box/max/y", -2.0, "at least -1.22 m"),
+        ("box/max/x", -0.5, "at least -0.06423 m: the proof needs 0.94 m between the walls"),
+        ("box/max/y", -2.0, "at least -1.064 m"),
         ("box/max/z", 0.3, "at least 0.4126 m: the proof needs 0.41 m"),
         ("box/min/x", math.nan, "a finite number >= -1e+09"),
         ("braking/horizontal", 1.5, "at most 1.429 m/s^2"),

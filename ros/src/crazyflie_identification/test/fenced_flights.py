@@ -1,5 +1,6 @@
 """Flights of simulated and virtual vehicles against their fences, and what their fences assume."""
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from crazyflie_model.limits import MIN_THRUST
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
+from crazyflie_state_estimator.control_response import ControlInput
 from crazyflie_state_estimator.motion import (
     ACCELERATION_WALK_WITH_CONTROL,
     POSITION_NOISE,
@@ -25,7 +27,7 @@ from crazyflie_state_estimator.motion import (
 
 PERIOD = 0.01  #: Of poses and controls (s).
 SETTLING = 8.0  #: Time until the integrator has found the weight (s).
-CENTRE, HALF = np.array([0.0, 0.0, 4.0]), 1.0  #: Of the box (m).
+CENTRE = np.array([0.0, 0.0, 4.0])  #: Of the box (m).
 SPREAD = 0.03  #: Largest error of mass, and of thrust, as fractions.
 
 #: K_quadrotor.txt, and its integrator.
@@ -72,11 +74,14 @@ class FencedFlight:
     measured_velocities: NDArray[np.float64]
     commanded: NDArray[np.float64]  #: Accelerations, m/s^2.
     changed: NDArray[np.bool_]  #: Shape (n,), where the fence changed the control.
+    #: Shape (n,), where the regular control would have left the set, by the errors at their worst.
+    needed: NDArray[np.bool_]
+    half: float  #: Half of the box, m.
 
     @property
     def outside(self) -> float:
         """How far outside of the box the vehicle was, m; negative if it was not."""
-        return float(np.max(np.abs(self.positions - CENTRE)) - HALF)
+        return float(np.max(np.abs(self.positions - CENTRE)) - self.half)
 
     def position_error(self) -> float:
         """Return the largest error of a position, m."""
@@ -110,10 +115,46 @@ def gained(commanded, tau, delay):
     return np.array(speeds)
 
 
+def is_needed(fence, time, position, velocity, regular, yaw, before):
+    """Return whether a regular control may lead out of the set, with all errors at their worst.
+
+    ``before`` is the acceleration that was commanded before, m/s^2. As the fence reckons, without
+    what it adds: a bend between samples, and the time for which it could hold its own controls.
+    """
+    moves = fence._predict(time, tuple(velocity))
+    wanted = fence._acceleration_of(regular, yaw)
+    for i, (low, high, axis) in enumerate(fence._walls):
+        for sign, room, (way, v, a) in (
+            (1.0, high - position[i], moves[i]),
+            (-1.0, position[i] - low, moves[i + 3]),
+        ):
+            u = sign * wanted[i]
+            farthest = axis.reach(v + axis.velocity_margin, a, max(sign * before[i], u), u)
+            if farthest > max(room - way - axis.position_margin, 0.0):
+                return True
+    return False
+
+
 def fly(
-    kind, name, seed, duration, axes, noise=0.0, kalman=False, spread=SPREAD, step=1.0, late=True
+    kind,
+    name,
+    seed,
+    duration,
+    axes,
+    noise=0.0,
+    kalman=False,
+    spread=SPREAD,
+    step=1.0,
+    late=True,
+    delay=0.0,
+    half=1.0,
+    path=None,
 ):
-    """Fly against the walls: the reference jumps to and fro, up to 2 m beyond them."""
+    """Fly against the walls: the reference jumps to and fro, up to 2 m beyond them.
+
+    Or it follows ``path(t)``, which returns its position from the centre and its velocity. Controls
+    arrive after ``delay`` (s) and up to a period.
+    """
     random = np.random.default_rng(seed)
     model = TYPES[name]
     errors = random.uniform(-spread, spread, 2).tolist()
@@ -121,15 +162,21 @@ def fly(
     mocap = MotionCapture(noise, noise, seed=seed)
     controller = IntegralStateFeedback(GAINS, np.array([0.0, 0.0, 0.0, 9.81]), 6, *INTEGRATOR)
     controller.enable_integrator()
-    fence = Geofence(tuple(CENTRE - HALF), tuple(CENTRE + HALF), axes, bounds.max_thrust(name))
+    fence = Geofence(tuple(CENTRE - half), tuple(CENTRE + half), axes, bounds.max_thrust(name))
     velocities = FiniteDifference()
     if kalman:
         velocities = ConstantAccelerationFilter(POSITION_NOISE, ACCELERATION_WALK_WITH_CONTROL)
-    latency = random.uniform(0.0, 0.9) * PERIOD
-    target, change = CENTRE, 0.0
+    response = ControlInput()
+    latency = delay + random.uniform(0.0, 0.9) * PERIOD
+    pending = deque()
+    target, velocity, change = CENTRE, (0.0, 0.0, 0.0), 0.0
     commanded, rows, before = (0.0, 0.0, 0.0), [], None
     for tick in range(round((SETTLING + duration) / PERIOD)):
         t = tick * PERIOD
+        while pending and pending[0][0] <= t:
+            arrival, sent = pending.popleft()
+            vehicle.advance_to(arrival)
+            vehicle.send(*sent)
         vehicle.advance_to(t)
         true = np.array(vehicle.pose[0]), np.array(vehicle.velocity)
         mocap.measure(t, *vehicle.pose)
@@ -138,12 +185,17 @@ def fly(
         if not tick:
             velocities.start(position)
             continue
-        p, v = velocities.step(PERIOD, position, commanded if kalman else None)
+        p, v = velocities.step(
+            PERIOD, position, response.response(response.acceleration(yaw, t), t)
+        )
         since = t - SETTLING
-        if since >= change:
+        if path is not None:
+            offset, velocity = path(max(since, 0.0))
+            target = CENTRE + offset
+        elif since >= change:
             change = since + step * 10.0 ** random.uniform(-0.5, 0.6)
-            target = CENTRE + random.uniform(-3.0, 3.0, 3)
-        reference = np.array([*target, 0.0, 0.0, 0.0, 0.0])
+            target = CENTRE + random.uniform(-2.0 - half, 2.0 + half, 3)
+        reference = np.array([*target, *velocity, 0.0])
         regular = controller.control(np.array([*p, *v, yaw]), reference, t)
         control = regular = tuple(float(part) for part in limited(list(regular)))
         if since >= 0.0:
@@ -152,12 +204,14 @@ def fly(
             used = answer if before is None or not late or random.random() < 0.5 else before
             before = answer
             control = used[0] if used[1] else regular
+        changed = control != regular
+        needed = changed and is_needed(fence, t, p, v, regular, yaw, commanded)
         roll, pitch, yaw_dot, thrust = control
         thrust = min(max(thrust, MIN_THRUST), bounds.max_thrust(name))
         fence.sent(t, control, yaw)
+        response.command((roll, pitch, yaw_dot, thrust), t)
         commanded = tuple(coupled_acceleration((roll, pitch, yaw_dot, thrust), yaw))
-        vehicle.advance_to(t + latency)
-        vehicle.send(roll, pitch, yaw_dot, round(model.pwm(thrust)))
+        pending.append((t + latency, (roll, pitch, yaw_dot, round(model.pwm(thrust)))))
         if since >= -0.5:
-            rows.append((*true, p, v, commanded, control != regular))
-    return FencedFlight(*(np.array(column) for column in zip(*rows, strict=True)))
+            rows.append((*true, p, v, commanded, changed, needed))
+    return FencedFlight(*(np.array(column) for column in zip(*rows, strict=True)), half)

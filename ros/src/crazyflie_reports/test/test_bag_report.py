@@ -6,6 +6,7 @@ import re
 
 import bags
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import String
 
 from crazyflie_msgs.msg import VehicleStatus
@@ -431,3 +432,15 @@ def test_a_vehicle_that_cannot_fly_is_an_event_once():
     (event,) = log.events
     assert (event.time, event.kind) == (1, Kind.ERROR)
     assert event.text == "the vehicle cannot fly: locked, deck fault"
+
+
+def test_a_fence_that_is_not_certain_is_a_warning_of_its_vehicle_once():
+    log = EventLog()
+    text = "the box is not certain: disturbance along x 0.9 m/s^2, bound 0.6"
+    for time, level in enumerate((DiagnosticStatus.OK, *[DiagnosticStatus.WARN] * 3)):
+        status = DiagnosticStatus(level, "cf1/geofence: certificate", text if level else "", "", [])
+        message = DiagnosticArray(status=[status])
+        log.add(time, "/diagnostics", "", "diagnostic_msgs/DiagnosticArray", message)
+    (event,) = log.events
+    assert (event.time, event.kind, event.namespace) == (1, Kind.WARNING, "cf1")
+    assert event.text == f"cf1/geofence: certificate: {text}"

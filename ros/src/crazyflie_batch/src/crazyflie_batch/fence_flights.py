@@ -84,13 +84,16 @@ class Adversary:
 def fly(case: Case, policy: Array, seed: int, controller: Controller | None = None) -> Array:
     """Return how far flights were outside at most, m, shape (n,): negative if always inside.
 
-    They begin at rest in the middle. ``policy`` is that of an `Adversary`; a ``controller`` takes
-    the place of its regular control.
+    They begin at rest, anywhere between the walls' sets. ``policy`` is that of an `Adversary`; a
+    ``controller`` takes the place of its regular control.
     """
     axis, random = case.axis, np.random.default_rng(seed)
     n = policy.shape[1]
     adversary = Adversary(policy, case, random)
-    p, v, a = np.full(n, (case.low + case.high) / 2.0), np.zeros(n), np.zeros(n)
+    v, a = np.zeros((2, n))
+    # The controls before have been 0.
+    room = axis.position_margin + axis.bulge + axis.reach(axis.velocity_margin, 0.0, 0.0, 0.0)
+    p = np.full(n, case.low + room) + (case.high - case.low - 2.0 * room) * random.random(n)
     # The largest and the smallest acceleration that the fence knows of.
     most, least = np.zeros((2, n))
     step = response(case.substep, axis.tau)
@@ -151,10 +154,7 @@ def _fenced(case, up, down, wanted, last, was_free):
     axis, top = case.axis, case.axis.largest
     up = case.high - up[0], up[1], up[2]
     down = down[0] - case.low, -down[1], -down[2]
-    free = np.ones(len(wanted), dtype=bool)
-    for distance, speed, acceleration in (up, down):
-        way = axis.reach(speed + axis.velocity_margin, acceleration, top, top)
-        free &= way <= distance - axis.position_margin - axis.bulge
+    free = axis.is_free(*up) & axis.is_free(*down)
     (near,) = np.nonzero(~free)
     control = wanted.copy()
     if len(near):

@@ -242,7 +242,11 @@ class GraphModel:
     def _snapshot(self, name, fixed):
         """Return the snapshot of a vehicle; one that cannot be drawn must not stop the others."""
         try:
-            now = self.models[name].snapshot(self.frames, fixed)
+            model = self.models[name]
+            now = model.snapshot(self.frames, fixed)
+            fence = f"{model.vehicle.namespace}/geofence: certificate".lstrip("/")
+            if not now.reason and (uncertain := self._diagnostics.wrong(fence)):
+                now = replace(now, reason=uncertain[0].message)
             return replace(now, is_held=True) if name in self._surroundings.held else now
         except Exception as error:
             self.handle.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)

@@ -43,16 +43,20 @@ class Diagnostics:
         for status in message.status:
             self._status[status.name] = self._time(), status
 
+    def wrong(self, name: str = "") -> list[DiagnosticStatus]:
+        """Return all diagnostics that are not OK, or those of a name, errors first."""
+        since = self._time() - _MAX_AGE
+        found = [
+            status
+            for at, status in self._status.values()
+            if at >= since and status.level != DiagnosticStatus.OK and name in ("", status.name)
+        ]
+        return sorted(found, key=lambda each: (-each.level, each.name))
+
     def sentences(self) -> tuple[Sentence, ...]:
         """Return all diagnostics that are not OK, errors first."""
-        since = self._time() - _MAX_AGE
-        fresh = [status for at, status in self._status.values() if at >= since]
-        wrong = sorted(
-            (each for each in fresh if each.level != DiagnosticStatus.OK),
-            key=lambda each: (-each.level, each.name),
-        )
         words = {DiagnosticStatus.WARN: "warn"}
-        return tuple(Sentence(words.get(s.level, "error"), s.name, s.message) for s in wrong)
+        return tuple(Sentence(words.get(s.level, "error"), s.name, s.message) for s in self.wrong())
 
     def kind(self, vehicle: FoundVehicle) -> Kind:
         """Return the kind of a vehicle, by the address that its driver has for it."""

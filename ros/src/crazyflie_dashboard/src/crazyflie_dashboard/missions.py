@@ -104,13 +104,13 @@ class MissionFlight:
 
     @property
     def text(self) -> str:
-        """Its title with its last command, and the time that is left, as far as they are known."""
+        """Its title, the time that is left, and its last command, as far as they are known."""
         took, left = time.monotonic() - self._since, ""
         if steps := self.steps:
             rest = sum(each.duration for each in steps if each.state == "next")
             now = sum(each.duration for each in steps if each.state == "now")
             left = f"{rest + max(0.0, now - took):.0f} s left"
-        return " · ".join(filter(None, (self.title, self.command, left)))
+        return " · ".join(filter(None, (self.title, left, self.command)))
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -332,6 +332,7 @@ class FleetConfig:
     unplaced: tuple[tuple[str, str], ...] = ()
     # Bodies that are seen, and never flown: the entries with the connection `NONE`.
     obstacles: tuple[VehicleConfig, ...] = ()
+    fence: bool = False  # Whether each vehicle has a geofence.
 
     @property
     def names(self) -> tuple[str, ...]:

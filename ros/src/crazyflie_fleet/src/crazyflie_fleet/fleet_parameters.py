@@ -111,8 +111,9 @@ class FlyParameters(FleetParameters):
     )
     fence: bool = parameter(
         BOOLEAN,
-        "whether each vehicle has a geofence, whose box is in nodes/geofence/box; of up to 21 "
-        "vehicles, each also has half of the room between it and another",
+        "whether each vehicle has a geofence, whose box is in nodes/geofence/box, as with `fence: "
+        "true` in the fleet file; of up to 21 vehicles, each also has half of the room between it "
+        "and another",
         False,
     )
     common: Mapping[str, Any] = parameter(

@@ -41,7 +41,7 @@ from crazyflie_virtual.log import MAX_BYTES, log_variables
 #: Least similarity of an unknown key to a known one that is misspelt (0 to 1).
 _SIMILAR = 0.8
 
-_TOP = ("robots", "robot_types", "all", "machines", "fileversion")
+_TOP = ("robots", "robot_types", "all", "machines", "fence", "fileversion")
 _FIRMWARE = ("firmware_params", "firmware_logging")
 _LOGGING = ("enabled", "default_topics", "custom_topics")
 
@@ -132,6 +132,8 @@ class FleetParser:
         }
         common = self._layer(self._parts.get("all"), "broadcasts")
         broadcasts = self._broadcasts(common.settings)
+        fence = self._parts.get("fence")
+        has_fence = fence is not None and self._check_type(BOOLEAN, fence.value, fence)
         own = {name: self._layer(entry) for name, entry in robots.items()}
         for name, entry in robots.items():
             self._check_type(VEHICLE_NAME, name, entry)
@@ -166,6 +168,7 @@ class FleetParser:
             broadcasts,
             unplaced,
             obstacles,
+            has_fence,
         )
 
     # Errors.

@@ -57,6 +57,13 @@ class _NodeFactory:
         vectorized: dict[str, tuple[VehicleConfig, ...]] = {}
         fleet = config.fleet()
         self._places = {name: place for place, name in enumerate(fleet.names)}
+        self._has_fence = config.fence or fleet.fence
+        if self._has_fence and len(fleet.names) > MAX_NEIGHBOURS + 1:
+            handle.warn(
+                f"the fences of {len(fleet.names)} vehicles do not keep them apart, only in the "
+                f"box: that is for up to {MAX_NEIGHBOURS + 1} vehicles; the avoidance of "
+                "collisions changes their references, as without fences"
+            )
         own_names = config.own_names(fleet)
         if not config.is_simulated:
             _check_positioning(config.file, fleet)
@@ -124,8 +131,7 @@ class _NodeFactory:
         return f"{name}/{ALL_STATES}"
 
     def _add_vehicle(self, vehicle: VehicleConfig) -> None:
-        fence = self._config.fence
-        classes = node_classes(vehicle, self._config.is_simulated, fence)
+        classes = node_classes(vehicle, self._config.is_simulated, self._has_fence)
         if f"{self._handle.name}/{vehicle.dynamics}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
@@ -135,7 +141,7 @@ class _NodeFactory:
         others = [name for name in self._places if name != vehicle.name]
         if len(others) > MAX_NEIGHBOURS:
             others = []
-        tree = parameters(vehicle, frames, self._common(vehicle.dynamics), fence, others)
+        tree = parameters(vehicle, frames, self._common(vehicle.dynamics), self._has_fence, others)
         if vehicle.name in self._unplaced:
             tree["takeoff_server"]["topics"]["inhibition"] = INHIBITION
         for name, node_class in (self._config.extra_nodes or {}).items():

@@ -3,7 +3,7 @@
 from dataclasses import fields, replace
 from typing import Any
 
-from crazyflie_geofence.geofence import LARGEST_HORIZONTAL, LARGEST_VERTICAL
+from crazyflie_geofence.geofence import CERTAIN_HORIZONTAL, LARGEST_HORIZONTAL, LARGEST_VERTICAL
 from crazyflie_geofence.viable_set import Axis
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_utils import Parameters, parameter
@@ -47,17 +47,19 @@ class Bounds(Parameters):
     )
 
 
-#: Bounds of the Crazyflie 2.1, measured on vehicles that are simulated: docs/geofence_proof.md says
-#: how, and what exceeded them. With velocities from differences of poses; no real vehicle.
-OF_TYPES = Bounds(
+#: Bounds of the Crazyflie 2.1, which no flight of docs/geofence_proof.md exceeds: of vehicles that
+#: are simulated, with velocities from differences of poses; no real vehicle.
+_OF_TYPES = Bounds(
     horizontal_lag=0.12,
     vertical_lag=0.05,
     delay=0.02,
     horizontal_disturbance=0.6,
     vertical_disturbance=1.0,
     position_error=0.002,
-    velocity_error=0.06,
 )
+
+#: e_v of each type (m/s). A battery that sags leaves too little for the attitude of a cf21plus.
+_VELOCITY_ERRORS = {"cf21": 0.06, "cf21_markers": 0.1, "cf21plus": 0.36, "brushless": 0.1}
 
 
 def load(model: str) -> Bounds:
@@ -66,8 +68,7 @@ def load(model: str) -> Bounds:
     `ParameterError` names errors of the file with their lines.
     """
     if model in TYPES:
-        # The thrust of the others is nearer to what their batteries give.
-        return OF_TYPES if model == "cf21" else replace(OF_TYPES, velocity_error=0.14)
+        return replace(_OF_TYPES, velocity_error=_VELOCITY_ERRORS[model])
     found = yaml_file.load(model)
     if RESULT not in found or KEY not in found[RESULT]:
         return Bounds()
@@ -101,17 +102,10 @@ def axes(
     """
     of = vars(bounds)
     rest = (of["position_error"], of["velocity_error"], of["delay"], spread, period)
-    x = Axis(
-        of["horizontal_lag"], horizontal, LARGEST_HORIZONTAL, of["horizontal_disturbance"], *rest
-    )
-    z = Axis(
-        of["vertical_lag"],
-        vertical,
-        LARGEST_VERTICAL,
-        of["vertical_disturbance"],
-        *rest,
-        certain=vertical,
-    )
+    largest, sure = LARGEST_HORIZONTAL, max(CERTAIN_HORIZONTAL, horizontal)
+    x = Axis(of["horizontal_lag"], horizontal, largest, of["horizontal_disturbance"], *rest, sure)
+    largest, sure = LARGEST_VERTICAL, vertical
+    z = Axis(of["vertical_lag"], vertical, largest, of["vertical_disturbance"], *rest, sure)
     return x, x, z
 
 

@@ -24,6 +24,9 @@ from crazyflie_model.units import GRAVITY
 #: Largest acceleration that a control can ask for, along any horizontal line and along z (m/s^2).
 LARGEST_HORIZONTAL = math.sqrt(2.0) * MAX_THRUST * math.sin(MAX_TILT)
 LARGEST_VERTICAL = MAX_THRUST - GRAVITY
+#: Acceleration by one tilt, under the thrust of hover. What is more rests on a thrust that may not
+#: be there yet, or not any more (m/s^2).
+CERTAIN_HORIZONTAL = GRAVITY * math.sin(MAX_TILT)
 
 #: A vehicle outside of the box comes back with this speed at most (m/s), slower on the last metre
 #: (1/s), and changes its speed within this time (s).
@@ -126,49 +129,50 @@ class Geofence:
             self._watch.compare(time, velocity)
             self._set_walls()
 
-        def is_far(plane):
-            distance, speed = plane.distance(position), -plane.along(velocity)
-            return self._axis(plane).is_far(distance, speed)
+        def place(plane):
+            return self._axis(plane), plane.distance(position), -plane.along(velocity)
 
         planes = self._obstacles.choose(
-            position, velocity, is_far, lambda plane: self._room(plane, position, velocity)
+            position,
+            velocity,
+            lambda plane: Axis.is_far(*place(plane)),
+            lambda plane: self._room(plane, *place(plane)),
         )
         planes += [halfway(position, other, self.buffer) for other in self.others]
-        # Far from all walls, a prediction would change nothing.
-        if all(
-            axis.is_far(high - p, v) and axis.is_far(p - low, -v)
+        # Towards the upper and the lower wall of each axis, and each plane: the bounds, the
+        # distance and the velocity.
+        places = [
+            each
             for (low, high, axis), p, v in zip(self._walls, position, velocity, strict=True)
-        ) and all(map(is_far, planes)):
+            for each in ((axis, high - p, v), (axis, p - low, -v))
+        ] + [place(plane) for plane in planes]
+        # Far from all walls, a prediction would change nothing.
+        near = [not Axis.is_far(*each) for each in places]
+        if not any(near):
             self._last = None
             return regular, 0.0
         self._advance(time)
-        # Towards each wall, and each plane: the distance, the velocity and the acceleration.
-        moves = self._predict(time, velocity)
-        sides = [
-            ((high - p - up[0], *up[1:]), (p - low - down[0], *down[1:]))
-            for (low, high, _), p, up, down in zip(
-                self._walls, position, moves[:3], moves[3:], strict=True
-            )
+        up_x, up_y, up_z, down_x, down_y, down_z = moves = self._predict(time, velocity)
+        ways = [up_x, down_x, up_y, down_y, up_z, down_z]
+        ways += [
+            tuple(_along(plane, each) for each in zip(*moves, strict=True)) for plane in planes
         ]
-        towards = []
-        for plane in planes:
-            way, v, a = (_along(plane, parts) for parts in zip(*moves, strict=True))
-            towards.append((plane.distance(position) - way, v, a))
-        if all(
-            _is_free(axis, *side)
-            for (_, _, axis), both in zip(self._walls, sides, strict=True)
-            for side in both
-        ) and all(
-            _is_free(self._axis(plane), *each) for plane, each in zip(planes, towards, strict=True)
+        states = [
+            (distance - way, v, a)
+            for (_, distance, _), (way, v, a) in zip(places, ways, strict=True)
+        ]
+        if not any(
+            is_near and not axis.is_free(*state)
+            for is_near, (axis, _, _), state in zip(near, places, states, strict=True)
         ):
             self._last = None
             return regular, 0.0
-        ranges = [
-            _range(axis, *both, None if self._last is None else self._last[i])
-            for i, ((_, _, axis), both) in enumerate(zip(self._walls, sides, strict=True))
-        ]
+        lasts: Sequence[float | None] = self._last or (None, None, None)
+        walls = zip(self._walls, states[0:6:2], states[1:6:2], lasts, strict=True)
+        ranges = [_range(axis, up, down, last) for (_, _, axis), up, down, last in walls]
         limits = [
-            (plane, self._most(plane, *each)) for plane, each in zip(planes, towards, strict=True)
+            (plane, self._most(plane, *each))
+            for plane, each in zip(planes, states[6:], strict=True)
         ]
         wanted = self._acceleration_of(regular, yaw)
         nearest = _allowed(wanted, ranges, limits)
@@ -184,11 +188,9 @@ class Geofence:
         """Return the bounds along a plane's normal: x has those of every horizontal line."""
         return self._walls[2 if plane.normal[2] else 0][2]
 
-    def _room(self, plane, position, velocity):
+    def _room(self, plane, axis, distance, speed):
         """Return the distance between the stopping point and a plane, m, from now on."""
-        distance, speed = plane.distance(position), -plane.along(velocity)
-        acceleration = _along(plane, self._acceleration)
-        return distance - self._axis(plane).stopping_distance(speed, acceleration)
+        return distance - axis.stopping_distance(speed, _along(plane, self._acceleration))
 
     def _most(self, plane, distance, v, a):
         """Return the largest acceleration towards a plane."""
@@ -296,10 +298,6 @@ def _along(plane, towards):
     return sum(
         abs(part) * towards[i if part < 0.0 else i + 3] for i, part in enumerate(plane.normal)
     )
-
-
-def _is_free(axis, distance, v, a):
-    return axis.is_free(distance - axis.position_margin, v + axis.velocity_margin, a)
 
 
 def _allowed(wanted, ranges, limits):

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Axis:
     spread: float  #: From the earliest to the latest such time.
     period: float  #: Longest time from one control to the next.
     #: Largest acceleration that a control certainly has, m/s^2: of a larger one, a part may be
-    #: missing, as thrust has limits that attitude loops and batteries lower.
+    #: missing. Attitude loops and batteries lower the thrust, which changes sooner than the tilt.
     certain: float = math.inf
 
     def disturbed(self, more: float) -> "Axis":
@@ -111,10 +111,6 @@ class Axis:
     def _smooth_hold(self) -> Response:
         return response(max(self.period, _SMOOTH), self.tau)
 
-    @cached_property
-    def _whole(self) -> Response:
-        return response(self.horizon, self.tau)
-
     def stopping_distance(self, v: Number, a: Number) -> Number:
         """Return s(v, a): how far a vehicle still moves forwards under full braking.
 
@@ -138,16 +134,15 @@ class Axis:
         lag = tau * (t - tau * (1.0 - f.exp(-t / tau)))
         return f.max(v * t + c * lag - b * t * t / 2.0, 0.0), t, lag
 
-    def reach(self, v: Number, a: Number, gap: Number, u: Number) -> Number:
+    def reach(
+        self, v: Number, a: Number, gap: Number, u: Number, hold: Response | None = None
+    ) -> Number:
         """Return how far a vehicle can get, m, that brakes after one more control.
 
         At velocity v and acceleration a, ``gap`` (m/s^2) is in force for the spread of the delay,
-        then ``u`` for a period, then full braking, all with the worst disturbance.
+        then ``u`` for a period, or ``hold``, then full braking, all with the worst disturbance.
         """
-        return self._reach(v, a, gap, u, self._hold)
-
-    def _reach(self, v, a, gap, u, hold):
-        way, v, a = self._after(v, a, gap, u, hold)
+        way, v, a = self._after(v, a, gap, u, hold or self._hold)
         return way + self.stopping_distance(v, a)
 
     def _after(self, v, a, gap, u, hold):
@@ -176,22 +171,14 @@ class Axis:
         k = v + speed
         return way + v * t + (k * k * factor if k > 0.0 else 0.0) <= room
 
-    def is_free(self, room: float, v: float, a: float) -> bool:
-        """Return whether any control may be in force for the horizon, without a root.
+    def is_free(self, distance: Number, v: Number, a: Number) -> Any:
+        """Return whether any control may be in force for the horizon.
 
-        ``room`` is the distance from the wall at the end of the delay (m), v the velocity towards
-        it, both with their margins. Without the lag's exponential the stopping distance is at most
-        (v + c tau)^2 / (2 b).
+        Distance from the wall (m), velocity and acceleration towards it are those predicted for the
+        end of the delay.
         """
-        r, u, d = self._whole, self.largest, self.disturbance
-        t = r.time
-        way = v * t + a * r.way + u * r.held_way + d * t * t / 2.0
-        v = v + a * r.speed + u * r.held_speed + d * t
-        a = a * r.fade + u * (1.0 - r.fade)
-        k = v + (a + self.braking) * self.tau
-        if k > 0.0:
-            way += k * k / (2.0 * (self.braking - d))
-        return way + self.bulge <= room
+        farthest = self.reach(v + self.velocity_margin, a, self.largest, self.largest)
+        return farthest + self.bulge + self.position_margin <= distance
 
     def control_range(
         self,
@@ -238,9 +225,9 @@ class Axis:
         room = f.max(distance - self.position_margin, 0.0) - self.bulge
         v = v + self.velocity_margin
         low, high = 0.0 * v - self.braking, 0.0 * v + self.largest
-        if isinstance(v, float) and self._reach(v, a, high, high, hold) <= room:
+        if isinstance(v, float) and self.reach(v, a, high, high, hold) <= room:
             return high
-        least = self._reach(v, a, f.max(last, low), low, hold) - room
+        least = self.reach(v, a, f.max(last, low), low, hold) - room
         if isinstance(v, float) and least > 0.0:
             return low
         # The reach is convex in the control: tangents come from above, and the chord between a
@@ -259,7 +246,7 @@ class Axis:
             moves = 1.0 * (distance > 0.0)
             slope = by_way + moves * (t * by_speed + lag * by_acceleration)
             high = f.max(high - f.max(way + distance - room, 0.0) / slope, low)
-        most = f.max(self._reach(v, a, f.max(last, high), high, hold) - room, 0.0)
+        most = f.max(self.reach(v, a, f.max(last, high), high, hold) - room, 0.0)
         u = low + (high - low) * (-least / f.max(most - least, 1e-12))
         return (
             f.min(u, high) if isinstance(v, float) else np.where(least > 0.0, low, f.min(u, high))

@@ -132,7 +132,8 @@ export default {
       this.isOld = true;
     },
     update(poses) {
-      this.poses = poses;  // They may come before the names that they belong to.
+      this.poses = poses;
+      if (poses.length !== this.vehicles?.names.length) return;  // The names that they belong to come later.
       this.change(() => this.vehicles.update(poses));
       const count = poses.filter(([x]) => x !== null).length;
       if (this.isTouched || count <= (this.count ?? 0)) return;

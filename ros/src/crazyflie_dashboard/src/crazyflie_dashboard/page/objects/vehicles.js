@@ -137,7 +137,6 @@ export class Vehicles extends THREE.Group {
   // Set the poses, in the order of the names: each x, y, z (null if not known), quaternion x, y, z,
   // w, condition, chosen, a text behind the name, and position of the reference if there is one.
   update(poses) {
-    if (poses.length !== this.names.length) return;
     this.poses = poses;
     this.isTurning = poses.some((pose) => pose[7] === 1);
     this.references.visible = poses.some((pose) => pose.length > 10);

@@ -126,8 +126,11 @@ def _began_on_ground(facts, memory):
 
 
 def _began_in_flight(facts, memory):
-    is_checked = not facts.sees or facts.seen is not None
-    return facts.in_flight and facts.is_commanded and is_checked
+    seen = facts.seen
+    is_checked = not facts.sees or seen is not None
+    # In a takeoff the controller flies it once the server sends no takeoff controls any more.
+    is_lifted = facts.flight is FlightState.TAKING_OFF and seen and not facts.ground.is_below(seen)
+    return (facts.in_flight or is_lifted) and facts.is_commanded and is_checked
 
 
 def _touched_down(facts, memory):

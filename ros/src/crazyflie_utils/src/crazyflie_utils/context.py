@@ -280,7 +280,11 @@ class ProcessContext:
         waits: bool = False,
         errors: Mapping[str, type[Exception]] = MappingProxyType({}),
     ) -> Any:
-        """Return, or raise, the outcome of ``read()``; see `NodeHandle.value`."""
+        """Return, or raise, the outcome of ``read()``, which a replay takes from the journal.
+
+        What was read has a name there, and must be JSON. If it ``waits``, the turn of a task is
+        given up meanwhile. ``errors`` are those that it may raise beside Python's own, by name.
+        """
         if waits:
             read = partial(self.tasks.outside, read)
         return read() if self.recorder is None else self.recorder.value(what, read, errors)

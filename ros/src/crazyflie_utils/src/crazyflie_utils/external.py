@@ -23,7 +23,7 @@ class Interface:
 
 
 class External:
-    """Passes everything on to an object, by `NodeHandle.value`; it does not exist in a replay.
+    """Passes everything on to an object, by `ProcessContext.value`; it does not exist in a replay.
 
     In turn, each outcome is in the journal, with numbers and texts of the call's arguments.
     """
@@ -65,12 +65,15 @@ class External:
 
     def _method(self, name, path):
         def call(*arguments, **named):
-            shown = [*map(_described, arguments), *map(_described, named.values())]
+            shown = ""
+            # Setpoints come often, and only a journal needs their texts.
+            if self._handle.has_journal:
+                shown = ", ".join(map(_described, (*arguments, *named.values())))
 
             def perform():
                 return getattr(self.target, name)(*map(_itself, arguments), **named)
 
-            return self._value(path, f"({', '.join(shown)})", perform)
+            return self._value(path, f"({shown})", perform)
 
         return call
 

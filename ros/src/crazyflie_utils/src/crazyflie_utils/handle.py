@@ -3,10 +3,9 @@
 import contextlib
 import math
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 import genpy
@@ -67,6 +66,7 @@ class NodeHandle:
         self.rejected_transforms = tf.rejected_by_reason
         #: See `Transport.service_nodes`, which waits for the master.
         self.service_nodes = process.transport.service_nodes
+        self.value = process.value  #: See `ProcessContext.value`.
 
     def child(self) -> "NodeHandle":
         """Return another handle of the node, to be closed before it; from any thread."""
@@ -369,19 +369,10 @@ class NodeHandle:
         """
         self._process.tasks.outside(call, *arguments)
 
-    def value(
-        self,
-        what: str,
-        read: Callable[[], Any],
-        waits: bool = False,
-        errors: Mapping[str, type[Exception]] = MappingProxyType({}),
-    ) -> Any:
-        """Return, or raise, the outcome of ``read()``, which a replay takes from the journal.
-
-        What was read has a name there, and must be JSON. If it ``waits``, the turn of a task is
-        given up meanwhile. ``errors`` are those that it may raise beside Python's own, by name.
-        """
-        return self._process.value(what, read, waits, errors)
+    @property
+    def has_journal(self) -> bool:
+        """Whether values are in a journal, which is written, or run again."""
+        return self.is_replay or self._process.recorder is not None
 
     @property
     def is_replay(self) -> bool:

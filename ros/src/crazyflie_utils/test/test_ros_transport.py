@@ -64,8 +64,10 @@ def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
 
 def test_unanswered_calls_do_not_pile_up(monkeypatch):
     answered = threading.Event()
+    running = []
 
     def exchange(connection, request):
+        running.append(connection.name)
         answered.wait(20.0)
         return EmptyResponse()
 
@@ -73,23 +75,20 @@ def test_unanswered_calls_do_not_pile_up(monkeypatch):
     monkeypatch.setattr("crazyflie_utils.ros1.calls._Connection.exchange", exchange)
     transport = RosTransport()
 
-    def call(name="/slow", limit=0.01):
-        return transport.call_service(name, Empty, EmptyRequest(), limit, math.inf)
+    def call(name):
+        return transport.call_service(name, Empty, EmptyRequest(), 60.0, math.inf)
 
-    before = threading.active_count()
-    futures = [call() for _ in range(50)]
-    for future in futures:
-        assert isinstance(future.exception(timeout=20.0), ServiceError)
-    assert "/slow has not answered 8 earlier calls" in str(futures[-1].exception())
-    assert threading.active_count() <= before + 8
+    *unanswered, refused = (call("/slow") for _ in range(9))
+    with pytest.raises(ServiceError, match="/slow has not answered 8 earlier calls"):
+        refused.result(timeout=0)
+    wait_until(lambda: len(running) == 8, "the calls run")
     # A service that is alive is not affected.
     other = call("/other")
     answered.set()
-    for thread in threading.enumerate():
-        if thread is not threading.current_thread() and thread.daemon:
-            thread.join(5.0)
-    assert other.done()
-    assert call(limit=20.0).result(timeout=20.0) == EmptyResponse()
+    for future in [*unanswered, other]:
+        assert future.result(timeout=20.0) == EmptyResponse()
+    assert running == ["/slow"] * 8 + ["/other"]
+    assert call("/slow").result(timeout=20.0) == EmptyResponse()
 
 
 # Connections.

@@ -179,7 +179,7 @@ def test_of_a_flood_of_transforms_lossless(handle, process):
         mine.transforms[0].child_frame_id = "crazyflie"
         hostile.send(frame(mine) + frame(crowd(80)) * 3000)
         hostile.send(frame(crowd(2)))
-        wait_until(lambda: b"body001" in process.transforms._tree._unread, "the crowd")
+        wait_until(lambda: "body001" in process.transforms._tree._unread, "the crowd")
     found = lookup("world", "crazyflie")
     assert found.header.stamp == genpy.Time.from_sec(mine.transforms[0].header.stamp.to_sec())
 

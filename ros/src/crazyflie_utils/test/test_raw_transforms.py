@@ -14,7 +14,7 @@ from transform_helpers import hear, transform, x_of
 from crazyflie_utils import TransformError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.tf import frame_tree
-from crazyflie_utils.tf.frame_tree import RawTransforms
+from crazyflie_utils.tf.frame_tree import RawTransforms, StampedPose
 
 
 def raw(*transforms):
@@ -97,6 +97,38 @@ def test_frames_without_a_name_are_counted_without_a_lookup(process, lookup, cap
     assert process.handle("/node").rejected_transforms() == {"does not name its frames": 101}
     assert len(process.logged("warn")) == 2
     assert capfd.readouterr().err == ""
+
+
+def test_a_name_that_is_no_text_hides_nothing(process, lookup):
+    with pytest.raises(TransformError):
+        lookup("world", "crazyflie")
+    message = raw(transform("wor?d", "crazyflie", 100.0), transform("world", "crazyflie", 100.5))
+    process.publish("/tf", RawTransforms().deserialize(message.raw.replace(b"wor?d", b"wor\xffd")))
+    assert lookup("world", "crazyflie").header.stamp.to_sec() == 100.5
+
+
+def test_tf2_is_given_only_the_frames_that_it_is_needed_for(process, lookup, monkeypatch):
+    given = []
+    monkeypatch.setattr(
+        StampedPose,
+        "message",
+        lambda self, message=StampedPose.message: given.append(self) or message(self),
+    )
+    for time in (100.0, 100.1):
+        moving = [transform("world", child, time, x=time) for child in ("cage", "other")]
+        hear(process, *moving, transform("cage", "crazyflie", time, x=1.0))
+    assert x_of(lookup) == pytest.approx(101.1)
+    given.clear()
+    hear(process, transform("world", "cage", 100.2), transform("world", "other", 100.2))
+    assert [pose.child for pose in given] == ["cage"]
+
+
+def test_in_the_past_a_frame_has_the_parent_of_then(process, lookup):
+    hear(process, transform("world", "cage", 99.0, x=5.0), transform("world", "cage", 100.0, x=5.0))
+    for time, parent in ((99.0, "cage"), (99.5, "cage"), (100.0, "world")):
+        hear(process, transform(parent, "crazyflie", time, x=1.0))
+    found = lookup("world", "crazyflie", genpy.Time(99, 250_000_000))
+    assert found.transform.translation.x == pytest.approx(6.0)
 
 
 @given(st.binary(max_size=200))

@@ -41,8 +41,8 @@ class Frames:
         #: Frame whose newest pose was rejected -> reason.
         self.rejected: dict[str, str] = {}
         self._time, self._nanoseconds, self._ahead = time, nanoseconds, ahead
-        self._latest: dict[bytes, tuple[bytes, int, int]] = {}
-        self._counts: Counter[bytes] = Counter()
+        self._latest: dict[str, bytes] = {}
+        self._counts: Counter[str] = Counter()
         self._counted_since = time()
         self.clear()
 
@@ -55,9 +55,9 @@ class Frames:
     def read(self, raw: bytes) -> None:
         """Store a serialized tf2_msgs/TFMessage."""
         try:
-            for child, start, end in entries(raw):
+            for child, entry in entries(raw):
                 if child in self._latest or len(self._latest) < _MAX_FRAMES:
-                    self._latest[child] = raw, start, end
+                    self._latest[child] = entry
                     self._counts[child] += 1
         except (struct.error, ValueError):
             # The doctor reports that; a display cannot correct it.
@@ -72,14 +72,10 @@ class Frames:
         """Decode the messages that have come since the last call."""
         now = self._time()
         elapsed = now - self._counted_since
-        for child, (raw, start, end) in self._latest.items():
-            try:
-                pose = decode_pose(raw, start, end)
-            except (UnicodeDecodeError, struct.error):
-                continue
-            self._tree.take(pose, self._nanoseconds())
-            if elapsed >= 1.0 and pose.child in self.poses:
-                self.poses[pose.child].rate = self._counts[child] / elapsed
+        for child, entry in self._latest.items():
+            self._tree.take(decode_pose(entry), self._nanoseconds())
+            if elapsed >= 1.0 and child in self.poses:
+                self.poses[child].rate = self._counts[child] / elapsed
         self._latest.clear()
         if elapsed >= 1.0:
             self._counts.clear()
@@ -119,12 +115,10 @@ class Frames:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
         if name not in self.poses:
             return None
-        pose = self._tree.latest(fixed, name)
-        if pose is None:
-            try:
-                pose = self._tree.lookup(fixed, name)
-            except TransformError:
-                return None
+        try:
+            pose = self._tree.lookup(fixed, name)
+        except TransformError:
+            return None
         return pose.position, pose.rotation
 
     def _on_new(self, stamped):

@@ -7,13 +7,13 @@ Transforms of other processes are decoded only for frames that were looked up, a
 them in the tree. The last transform of every other frame is kept serialized.
 
 Nearly every lookup is of the latest pose of a frame in its parent, which is answered here. The
-others go to tf2, whose buffer is filled with the latest poses at the first of them.
+others go to tf2, which is given the poses of a frame from its first such lookup on.
 """
 
 import functools
 import math
 import struct
-from collections import Counter, OrderedDict, deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import BinaryIO, NamedTuple
 
@@ -29,8 +29,10 @@ _LENGTH = struct.Struct("<I")
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<3I")  # Sequence number, s, ns.
 
-#: Largest number of frame pairs whose serialized and decoded names are stored.
-_MAX_NAMES = 1000
+_MAX_BYTES = 1024  #: Longest transform that is read (bytes).
+#: Largest number of frames that are known, of those kept serialized, and of pairs of names whose
+#: serialized form is stored.
+_MAX_FRAMES = 1000
 
 
 class StampedPose(NamedTuple):
@@ -95,62 +97,58 @@ class RawTransforms(TFMessage):
         return TFMessage().deserialize(self.raw).transforms
 
 
-def decode_pose(raw: bytes, start: int, end: int) -> StampedPose:
-    """Return the pose between two offsets of a serialized message, see `entries`.
+def entries(raw: bytes) -> Iterator[tuple[str, bytes]]:
+    """Yield child frame and serialized form of every transform of a serialized TFMessage.
 
-    UnicodeDecodeError: a name is not valid text.
+    A slash before the name of a frame is dropped; transforms of more than 1 kB are left out.
+    struct.error or ValueError: the message is shorter than its own length fields.
     """
-    _, seconds, nanoseconds = _STAMP.unpack_from(raw, start)
-    parent, child = _names(raw[start + _STAMP.size : end - _POSE.size])
-    numbers = _POSE.unpack_from(raw, end - _POSE.size)
+    (count,) = _LENGTH.unpack_from(raw)
+    start = _LENGTH.size
+    for _ in range(count):
+        names = start + _STAMP.size
+        child = names + _LENGTH.size + _LENGTH.unpack_from(raw, names)[0]
+        pose = child + _LENGTH.size + _LENGTH.unpack_from(raw, child)[0]
+        end = pose + _POSE.size
+        if end > len(raw):
+            raise ValueError
+        if end - start <= _MAX_BYTES:
+            yield _names(raw[names:pose])[1], raw[start:end]
+        start = end
+
+
+def decode_pose(entry: bytes) -> StampedPose:
+    """Return the pose of a serialized transform, see `entries`."""
+    _, seconds, nanoseconds = _STAMP.unpack_from(entry)
+    parent, child = _names(entry[_STAMP.size : -_POSE.size])
+    numbers = _POSE.unpack_from(entry, len(entry) - _POSE.size)
     moment = seconds * 1_000_000_000 + nanoseconds
     return StampedPose(parent, child, moment, numbers[:3], numbers[3:])
 
 
 def encode_poses(poses: Iterable[StampedPose]) -> RawTransforms:
     """Return a message with poses."""
-    parts: list[bytes] = []
-    for parent, child, stamp, position, rotation in poses:
-        parts += (
-            _STAMP.pack(0, *divmod(stamp, 1_000_000_000)),
-            _serialized_names(parent, child),
-            _POSE.pack(*position, *rotation),
-        )
-    # A pose has three parts.
-    return RawTransforms().deserialize(_LENGTH.pack(len(parts) // 3) + b"".join(parts))
+    parts = [
+        _STAMP.pack(0, *divmod(stamp, 1_000_000_000))
+        + _serialized_names(parent, child)
+        + _POSE.pack(*position, *rotation)
+        for parent, child, stamp, position, rotation in poses
+    ]
+    return RawTransforms().deserialize(_LENGTH.pack(len(parts)) + b"".join(parts))
 
 
-@functools.lru_cache(_MAX_NAMES)
+@functools.lru_cache(_MAX_FRAMES)
 def _names(raw):
     """Return the names of parent and child."""
     child = _LENGTH.size + _LENGTH.unpack_from(raw)[0]
     names = raw[_LENGTH.size : child], raw[child + _LENGTH.size :]
-    return tuple(name.decode().removeprefix("/") for name in names)
+    return tuple(name.decode(errors="replace").removeprefix("/") for name in names)
 
 
-@functools.lru_cache(_MAX_NAMES)
+@functools.lru_cache(_MAX_FRAMES)
 def _serialized_names(*names):
     texts = [name.encode() for name in names]
     return b"".join(_LENGTH.pack(len(text)) + text for text in texts)
-
-
-def entries(raw: bytes) -> Iterator[tuple[bytes, int, int]]:
-    """Yield child frame, start and end of every transform of a serialized TFMessage.
-
-    A slash before the name of a frame is dropped. struct.error or ValueError: the message is
-    shorter than its own length fields.
-    """
-    (count,) = _LENGTH.unpack_from(raw)
-    start = _LENGTH.size
-    for _ in range(count):
-        parent = start + _STAMP.size
-        child = parent + _LENGTH.size + _LENGTH.unpack_from(raw, parent)[0]
-        pose = child + _LENGTH.size + _LENGTH.unpack_from(raw, child)[0]
-        end = pose + _POSE.size
-        if end > len(raw):
-            raise ValueError
-        yield raw[child + _LENGTH.size : pose].removeprefix(b"/"), start, end
-        start = end
 
 
 TransformError = tf2_py.TransformException
@@ -161,9 +159,7 @@ connected), ExtrapolationException (not at that time).
 """
 
 _CACHE = genpy.Duration(10.0)  #: Length of tf2's buffer: tf2's default.
-#: Number of stamps stored for tf2: ten seconds of a vehicle at 1 kHz.
-_MAX_STAMPS = 10_000
-_HISTORY = 100  #: Number of poses of a frame that are kept until tf2 is used.
+_HISTORY = 100  #: Number of poses of a frame that are kept until tf2 is given them.
 _NORM_TOLERANCE = 0.01  #: tf2's tolerance of the squared norm of a quaternion.
 
 #: Largest step back of a stamp that came late by a slower path (ns): the newer pose stays the
@@ -171,19 +167,17 @@ _NORM_TOLERANCE = 0.01  #: tf2's tolerance of the squared norm of a quaternion.
 _STEP_BACK = 100_000_000
 
 _STEPS_BACK = 3  #: Number of such steps in a row that show that the source's clock was set back.
-_MAX_FRAMES = 1000  #: Largest number of known frames, and of frames kept serialized.
-_MAX_BYTES = 1024  #: Largest transform that is kept serialized (bytes).
-_ONE = b"\x01\0\0\0"  #: The length of a message with one transform.
 
 
 class _Frame:
-    """A moving frame: its poses and parent."""
+    """A moving frame: its latest pose, and those that tf2 was not given yet."""
 
     __slots__ = ("latest", "recent", "steps_back")
 
     def __init__(self, pose: StampedPose):
         self.latest = pose
-        self.recent: deque[StampedPose] = deque(maxlen=_HISTORY)
+        #: None: tf2 is given each one.
+        self.recent: deque[StampedPose] | None = deque(maxlen=_HISTORY)
         self.steps_back = 0
 
 
@@ -204,7 +198,8 @@ class FrameTree:
         clock_delay: float = 0.0,
     ):
         self.rejected: Counter[str] = Counter()  #: Number of dropped transforms by reason.
-        self.followed: set[str] = set()  #: Frames that are decoded.
+        #: Frames that are decoded; and the name that is not allowed.
+        self.followed = {""}
         self._warn = warn
         self._ahead = round(ahead * 1e9)
         self._clock_delay = round(clock_delay * 1e9)
@@ -212,64 +207,51 @@ class FrameTree:
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
-        # Serialized names of the frames that are followed; and the one that is not allowed.
-        self._wanted = {b""}
-        self._unread: dict[bytes, bytes] = {}
-        self._tf2: tf2_py.BufferCore | None = None
-        # tf2 in Python has floats, which resolve 0.1 us: the stamps by these floats.
-        self._stamps: OrderedDict[float, int] = OrderedDict()
+        self._unread: dict[str, bytes] = {}
+        self._tf2 = tf2_py.BufferCore(_CACHE)
 
     def clear(self) -> None:
         """Delete all moving frames: time has been reset."""
         self._frames.clear()
         self._unread.clear()
-        self._stamps.clear()
-        if self._tf2 is not None:
-            self._tf2.clear()
-
-    def latest(self, target: str, source: str) -> StampedPose | None:
-        """Return the latest pose of a moving frame, if ``target`` is right above it."""
-        frame = self._frames.get(source)
-        if frame is not None and frame.latest.parent == target and source not in self._static:
-            return frame.latest
-        return None
+        self._tf2.clear()
 
     def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
         """Return the pose of frame ``source`` in ``target`` at a ROS time (ns), or the latest.
 
         `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
+        frame = None if stamp or source in self._static else self._frames.get(source)
+        if frame is not None and frame.latest.parent == target:
+            return frame.latest
+        chains = [set(self._checked_chain(name)) for name in (target, source)]
         for name in (target, source):
-            self._check_parents(name)
-        for name in (target, source):
-            # tf2 is not needed as long as a frame is unknown.
             if name not in self._names and target != source:
                 text = f"frame {name} is not known; looked up {target} -> {source}"
                 raise tf2_py.LookupException(text)
-        if not set(self.chain(target)) & set(self.chain(source)):
+        if chains[0].isdisjoint(chains[1]):
             text = f"frames {target} and {source} are not connected"
             raise tf2_py.ConnectivityException(text)
-        if self._tf2 is None:
-            self._tf2 = tf2_py.BufferCore(_CACHE)
-            for pose in self._static.values():
-                self._add_to_tf2(pose, is_static=True)
-            for frame in self._frames.values():
-                for pose in frame.recent:
-                    self._add_to_tf2(pose)
-                frame.recent.clear()
+        path = chains[0] ^ chains[1] or {source}
+        moving = [self._frames[name] for name in (path & self._frames.keys()) - self._static.keys()]
+        # In the past, other frames may have been above these.
+        for frame in self._frames.values() if stamp else moving:
+            recent, frame.recent = frame.recent, None
+            for pose in recent or ():
+                self._tf2.set_transform(pose.message(), "tf")
+        # tf2's latest common time, to the nanosecond: tf2 in Python has floats (0.1 us).
+        stamp = stamp or min((frame.latest.stamp for frame in moving), default=0)
         found = self._tf2.lookup_transform_core(target, source, ros_time(stamp))
-        pose = StampedPose.of(found)
-        known = self._stamps.get(found.header.stamp.to_sec(), pose.stamp)
-        return pose._replace(stamp=stamp or known)
+        return StampedPose.of(found)._replace(stamp=stamp)
 
-    def read(self, raw: bytes, now: int) -> None:
-        """Process a serialized message at the ROS time ``now`` (ns)."""
+    def read(self, raw: bytes) -> Iterator[StampedPose]:
+        """Yield the poses of a serialized message that are followed; keep the others."""
         try:
-            for child, start, end in entries(raw):
-                if child in self._wanted:
-                    self.take(decode_pose(raw, start, end), now)
-                elif end - start <= _MAX_BYTES:
-                    self._unread[child] = raw[start:end]
+            for child, entry in entries(raw):
+                if child in self.followed:
+                    yield decode_pose(entry)
+                else:
+                    self._unread[child] = entry
                     if len(self._unread) > _MAX_FRAMES:
                         del self._unread[next(iter(self._unread))]
         except (struct.error, ValueError):
@@ -278,40 +260,54 @@ class FrameTree:
 
     def take(self, pose: StampedPose, now: int) -> None:
         """Process a pose at the ROS time ``now`` (ns); reject an invalid one."""
-        if not self._is_valid(pose) or not self._is_timely(pose, now):
+        if not self._is_valid(pose):
             return
-        frame = self._frames.get(pose.child)
+        stamp, frame = pose.stamp, self._frames.get(pose.child)
+        if stamp > now + self._ahead:
+            # Before the first /clock of a running simulation, now is 0.
+            if now:
+                warns = stamp > now + self._ahead + self._clock_delay
+                self._reject(pose, "is stamped in the future", warns)
+            return
+        if frame is not None and stamp < frame.latest.stamp - _STEP_BACK:
+            frame.steps_back += 1
+            if frame.steps_back < _STEPS_BACK:
+                self._reject(pose, "is stamped in the past")
+                return
+            # The last pose before the clock was set back would stay the latest until the stamps
+            # have caught up.
+            self.clear()
+            frame = None
         if frame is None:
             frame = self._frames[pose.child] = _Frame(pose)
             self._notice(pose, now)
-        if pose.stamp >= frame.latest.stamp:
+        elif stamp == frame.latest.stamp:
+            return
+        if stamp >= frame.latest.stamp:
             if pose.parent != frame.latest.parent:
                 self._notice(pose, now)
             frame.latest = pose
             frame.steps_back = 0
             self._on_new(pose)
-        if self._tf2 is None:
+        if frame.recent is not None:
             frame.recent.append(pose)
         else:
-            self._add_to_tf2(pose)
+            self._tf2.set_transform(pose.message(), "tf")
 
     def take_static(self, pose: StampedPose, now: int) -> None:
         """Process a static pose; reject an invalid one."""
-        if not self._is_valid(pose):
-            return
-        self._static[pose.child] = pose
-        self._add_to_tf2(pose, is_static=True)
-        self._notice(pose, now)
+        if self._is_valid(pose):
+            self._static[pose.child] = pose
+            self._tf2.set_transform_static(pose.message(), "tf")
+            self._notice(pose, now)
 
     def follow(self, frame: str | None, now: int) -> None:
         """Decode a frame and all above it, from the ROS time ``now`` (ns) on."""
         while frame is not None and frame not in self.followed:
-            if len(self.followed) >= _MAX_FRAMES:
+            if len(self.followed) > _MAX_FRAMES:
                 return
-            name = frame.encode()
-            self._wanted.add(name)
-            if kept := self._unread.pop(name, None):
-                self.read(_ONE + kept, now)
+            if kept := self._unread.pop(frame, None):
+                self.take(decode_pose(kept), now)
             # Called afterwards, to avoid a recursion over a long chain.
             self.followed.add(frame)
             frame = self._parent(frame)
@@ -324,8 +320,8 @@ class FrameTree:
             seen.add(name)
             name = self._parent(name)
 
-    def _check_parents(self, name):
-        """Refuse a frame in a loop, or with an ancestor that has two parents: tf2 does not.
+    def _checked_chain(self, name):
+        """Return `chain`; refuse a loop, and a frame that has two parents: tf2 does not.
 
         That happens if two bodies are swapped, or the frames of a static transform are exchanged.
         """
@@ -343,21 +339,12 @@ class FrameTree:
                 f"frames are in a loop, each the parent of the one before: {', '.join(loop)}; are "
                 "two bodies swapped?"
             )
+        return chain
 
     def _parent(self, name):
         if name in self._frames:
             return self._frames[name].latest.parent
         return self._static[name].parent if name in self._static else None
-
-    def _add_to_tf2(self, pose, is_static=False):
-        tf2 = self._tf2
-        if tf2 is None:
-            return
-        message = pose.message()
-        (tf2.set_transform_static if is_static else tf2.set_transform)(message, "tf")
-        self._stamps[message.header.stamp.to_sec()] = pose.stamp
-        if len(self._stamps) > _MAX_STAMPS:
-            self._stamps.popitem(last=False)
 
     def _notice(self, pose, now):
         """Store names that are new."""
@@ -378,26 +365,6 @@ class FrameTree:
         if len(names) >= _MAX_FRAMES and not (pose.parent in names and pose.child in names):
             return self._reject(pose, "is of more frames than the limit")
         return True
-
-    def _is_timely(self, pose, now):
-        """Return whether a pose is new; delete the moving frames if its source's clock was set."""
-        if pose.stamp > now + self._ahead:
-            # Before the first /clock of a running simulation, now is 0.
-            if not now:
-                return False
-            warns = pose.stamp > now + self._ahead + self._clock_delay
-            return self._reject(pose, "is stamped in the future", warns)
-        frame = self._frames.get(pose.child)
-        if frame is None:
-            return True
-        if pose.stamp < frame.latest.stamp - _STEP_BACK:
-            frame.steps_back += 1
-            if frame.steps_back < _STEPS_BACK:
-                return self._reject(pose, "is stamped in the past")
-            # The last pose before the clock was set back would stay the latest until the stamps
-            # have caught up.
-            self.clear()
-        return pose.stamp != frame.latest.stamp
 
     def _reject(self, pose, reason, warns=True):
         self.rejected[reason] += 1

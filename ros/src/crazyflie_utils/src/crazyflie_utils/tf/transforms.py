@@ -57,7 +57,7 @@ class Transforms:
         self._now = now
         self._tree = FrameTree(warn, ahead, self._note_arrival, clock_delay)
         self._publisher: Any = None
-        self._own: TFMessage | None = None
+        self._own: RawTransforms | None = None
         self._broadcasters = 0
         self._gathered: list[StampedPose] | None = None
         self._subscriber: Subscriber | None = None
@@ -114,11 +114,7 @@ class Transforms:
     def _broadcast_poses(self, poses):
         # A message is made only if it is received outside of this class.
         if self._subscriber is not None:
-            now = self._now()
-            with self._lock:
-                for pose in poses:
-                    self._tree.take(pose, now)
-            self._notify_listeners()
+            self._take(poses)
         if not self._publisher.has_subscribers(excluding=int(self._subscriber is not None)):
             return
         if self._gathered is None:
@@ -190,40 +186,33 @@ class Transforms:
     def lookup_pose(self, target: str, source: str, stamp: genpy.Time | None = None) -> StampedPose:
         """Return the result of `lookup` as a pose, which is quicker."""
         tree = self._tree
-        if target not in tree.followed or source not in tree.followed:
-            with self._lock:
-                tree.follow(target, self._now())
-                tree.follow(source, self._now())
-        pose = None if stamp else tree.latest(target, source)
-        if pose is not None:
-            return pose
         with self._lock:
+            if target not in tree.followed or source not in tree.followed:
+                for frame in (target, source):
+                    tree.follow(frame, self._now())
             return tree.lookup(target, source, stamp.to_nsec() if stamp else 0)
 
     def _on_transforms(self, message):
-        if message is self._own:
-            return
+        if isinstance(message, RawTransforms):
+            if message is not self._own:
+                self._take(self._tree.read(message.raw))
+        else:
+            self._take(map(StampedPose.of, message.transforms))
+
+    def _take(self, poses):
         now = self._now()
         with self._lock:
-            if isinstance(message, RawTransforms):
-                self._tree.read(message.raw, now)
-            else:
-                for transform in message.transforms:
-                    self._tree.take(StampedPose.of(transform), now)
-        self._notify_listeners()
+            for pose in poses:
+                self._tree.take(pose, now)
+            arrived, self._arrived = self._arrived, []
+        # Without the lock, since callbacks may look up poses.
+        for listener in arrived:
+            listener.callback()
 
     def _note_arrival(self, pose):
         for listener in self._listeners.get(pose.child, ()):
             if listener.is_due(pose.stamp):
                 self._arrived.append(listener)
-
-    def _notify_listeners(self):
-        # Called without the lock, since callbacks may look up poses.
-        if self._arrived:
-            with self._lock:
-                arrived, self._arrived = self._arrived, []
-            for listener in arrived:
-                listener.callback()
 
     def _on_static(self, message):
         with self._lock:

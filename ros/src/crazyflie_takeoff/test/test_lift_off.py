@@ -204,6 +204,10 @@ def test_nothing_lifts_a_vehicle_that_is_not_seen_any_more(hover, moment):
         highest = max(highest, network.vehicle.z)
     assert highest < begin + 0.45
     assert "the state on /state was lost in the liftoff" in str(answer.exception())
+    assert states(network)[-1] == "landing"
+    network.advance_until(lambda: states(network)[-1] == "on_ground")
+    network.advance(1.0)
+    assert network.vehicle.touchdown_speed < 1.6
 
 
 @pytest.mark.parametrize("moment", [0.1, 0.3])

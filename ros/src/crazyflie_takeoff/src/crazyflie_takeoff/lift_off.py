@@ -3,6 +3,8 @@
 Speeds are in m/s, z up; thrusts in m/s^2, mass-normalised for a vehicle that hovers at g.
 """
 
+import math
+
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.fallback import MAX_BRAKING, MAX_CORRECTION, SETTLING, limited
 from crazyflie_takeoff.hover_thrust import HoverThrust
@@ -14,9 +16,11 @@ LIFT_OFF_THRUST = GRAVITY + 0.2  #: Default thrust of the open-loop part of a ta
 LIFT_OFF_SPEED = 0.2
 CLIMB_SPEED = 0.1  #: Largest speed of the climb that follows (m/s).
 CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
-#: Time in which a vehicle that hovers at less than 0.85 g is faster than `LIFT_OFF_SPEED`, and
-#: after which a speed is not known any more (s).
-KNOWN_TIME = 0.15 + MAX_FEEDBACK_AGE
+KNOWN_TIME = 0.2  #: Time in which a vehicle that hovers at 0.85 g shows it (s): its motors lag.
+#: Largest acceleration of one that does not, over that of a vehicle that hovers at g.
+KNOWN_ACCELERATION = 1.25
+#: Thrust of a vehicle that may be light, and is not seen any more (m/s^2): it sinks.
+UNSEEN_THRUST = 0.5 * GRAVITY
 AVERAGING = 0.12  #: Time over which the thrust of hover is averaged (s).
 
 
@@ -31,6 +35,7 @@ class LiftOff:
         self._hover = HoverThrust(AVERAGING, thrust)
         self.is_lost = False  #: Whether the speed was known, and is not any more.
         self._seen: float | None = None  # Time for which the speed was known (s); None before.
+        self._z_dot = 0.0  # The last speed that was known (m/s).
 
     @property
     def hover(self) -> float:
@@ -45,12 +50,15 @@ class LiftOff:
         else:
             self._hover.update(step, self.thrust, z_dot)
         if z_dot is not None:
+            self._z_dot = z_dot
             self._seen = 0.0 if self._seen is None else self._seen + step
 
     @property
     def is_known(self) -> bool:
         """Whether a vehicle that has not lifted off yet is not one that hovers at much less."""
-        return self._seen is not None and self._seen > KNOWN_TIME
+        seen = -math.inf if self._seen is None else self._seen - MAX_FEEDBACK_AGE
+        speed = KNOWN_ACCELERATION * (LIFT_OFF_THRUST - GRAVITY) * seen
+        return seen > KNOWN_TIME and self._z_dot < speed
 
     def climb(self, distance: float, z_dot: float) -> None:
         """Choose the thrust of a vehicle below the hover point (``distance``, m)."""

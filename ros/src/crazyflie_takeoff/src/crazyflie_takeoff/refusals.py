@@ -162,7 +162,7 @@ WATCH: tuple[Guard, ...] = (
         "state is lost in the liftoff",
         OPEN_LOOP,
         lambda checks, flight: checks.state_complaint(flight.time),
-        Request.END,
+        Request.SINK,
         "{}",
     ),
     Guard("battery is critical", FLYING, _battery_fault, Request.LAND, "{}"),

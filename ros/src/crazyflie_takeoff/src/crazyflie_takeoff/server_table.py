@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.guards import Guard, first_firing
-from crazyflie_takeoff.hover_thrust import LEAST_HOVER
-from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
+from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, UNSEEN_THRUST, LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import PROGRESS, TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.phases import FilterState, FlightState
 from crazyflie_takeoff.profiles import Descent, TakeoffPlan
@@ -20,6 +19,8 @@ from crazyflie_utils.refusal import RefusalError
 
 #: Time after which a vehicle that is still on the ground is unable to fly (s).
 LIFT_OFF_TIME = 3.0
+#: Time of `UNSEEN_THRUST` before zero thrust after a liftoff that is not seen any more (s).
+UNSEEN_TIME = 1.0
 RAMP_DROP = 0.1  #: A vehicle that sinks further in the ramp was not on the ground (m).
 TOUCHDOWN_LIMIT = 2.0  #: Longest time from the end of the ramp to the touchdown (s).
 ZERO_THRUST_PERIOD = 0.1  #: Period of zero thrust on the ground (s).
@@ -56,6 +57,7 @@ class ServerState(enum.Enum):
     FLYING = 5, FlightState.FLYING
     DESCENDING = 6, FlightState.DESCENDING  # Sends references that sink.
     RAMPING_DOWN = 7, FlightState.LANDING  # Sends a thrust that decreases.
+    SINKING_UNSEEN = 11, FlightState.LANDING  # Sends a thrust with which every vehicle sinks.
     TOUCHING_DOWN = 8, FlightState.LANDING  # Repeats zero thrust until the vehicle is down.
     YIELDED = 9, FlightState.LANDING  # The filter brings the vehicle down.
 
@@ -71,6 +73,7 @@ class Request(enum.Enum):
     TAKEOFF = enum.auto()  # /takeoff was called, and no check refuses it.
     LAND = enum.auto()  # /land, critical battery, end of the launch, fault in a takeoff.
     END = enum.auto()  # The vehicle cannot fly any more: nothing flies it.
+    SINK = enum.auto()  # The vehicle is not seen any more in the open loop of a takeoff.
 
 
 class FilterReport(NamedTuple):
@@ -293,10 +296,12 @@ class FlightStateMachine:
             # Nothing lifts a vehicle that may be light, and is not seen any more: it is not high.
             may_be_light = self.state is ServerState.LIFTED or not self.lift_off.is_known
             is_pushed = not (self.lift_off.is_lost and may_be_light)
-            return self.lift_off.thrust if is_pushed else LEAST_HOVER
+            return self.lift_off.thrust if is_pushed else UNSEEN_THRUST
         if self.hover_thrust is not None:
             # The filter repeats it until the controller has the vehicle.
             return self.hover_thrust
+        if self.state is ServerState.SINKING_UNSEEN:
+            return UNSEEN_THRUST
         if self.state is ServerState.RAMPING_DOWN and self.begun is not None:
             return self.plan.ramp_thrust(self.elapsed, self.measured_hover)
         if self.state not in (ServerState.ON_GROUND, ServerState.TOUCHING_DOWN):
@@ -363,6 +368,9 @@ class FlightStateMachine:
             return False
         return self.measured[2] < self.ramp_height - RAMP_DROP and self.descent_speed > 0.0
 
+    def _unseen_for_long_enough(self):
+        return self.elapsed + ROUNDING >= UNSEEN_TIME
+
     def _ramp_over(self):
         return self.elapsed + ROUNDING >= self.plan.ramp
 
@@ -396,7 +404,7 @@ def _filter(*states):
 _S, _F, _M = ServerState, FilterState, FlightStateMachine
 OPEN_LOOP = (_S.LIFTING_OFF, _S.LIFTED)  #: The parts of a takeoff without the controller.
 _TAKEOFF = (*OPEN_LOOP, _S.CLIMBING)
-_ALOFT = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
+_ALOFT = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.SINKING_UNSEEN, _S.TOUCHING_DOWN)
 FLYING = (*_TAKEOFF, _S.FLYING)  #: The states that a landing ends.
 AIRBORNE = (*_TAKEOFF, *_ALOFT, _S.YIELDED)
 _BEGIN = (_S.RECOVERING,)
@@ -430,6 +438,7 @@ REQUESTS: tuple[Guard, ...] = (
     Guard("land", FLYING, _requested(Request.LAND, _M._landings_have_a_descent), _S.DESCENDING),
     Guard("land without descent", FLYING, _requested(Request.LAND), _S.RAMPING_DOWN),
     Guard("flight is over", AIRBORNE, _requested(Request.END), _S.ON_GROUND),
+    Guard("is not seen", OPEN_LOOP, _requested(Request.SINK), _S.SINKING_UNSEEN),
 )
 
 FOLLOWS: tuple[Guard, ...] = (
@@ -449,6 +458,7 @@ PROFILE: tuple[Guard, ...] = (
     # The ground may be lower than at the takeoff, for example next to a table.
     Guard("still sinks", (_S.RAMPING_DOWN,), _if(_M._still_sinks), _S.DESCENDING),
     Guard("ramp is over", (_S.RAMPING_DOWN,), _if(_M._ramp_over), _S.TOUCHING_DOWN),
+    Guard("is down unseen", (_S.SINKING_UNSEEN,), _if(_M._unseen_for_long_enough), _S.ON_GROUND),
     Guard("touchdown", (_S.TOUCHING_DOWN,), _if(_M._down_or_not_seen_or_too_late), _S.ON_GROUND),
     Guard("filter is too late", (_S.YIELDED,), _if(_M._filter_too_late), _S.ON_GROUND),
 )

@@ -211,7 +211,7 @@ class ProcessContext:
     """One executor, one clock, one set of topics and one tf buffer for all nodes of a process.
 
     With ``use_sim_time`` the clock is simulated time, which stands still until it is set; a process
-    without ROS passes its own ``clock`` and ``executor``. A ``recorder`` writes the journal.
+    without ROS passes its own clocks and ``executor``. A ``recorder`` writes the journal.
     """
 
     def __init__(
@@ -221,16 +221,17 @@ class ProcessContext:
         clock: SimulatedClock | SteadyClock | None = None,
         recorder: Any = None,
         executor: Executor | None = None,
+        machine_clock: SimulatedClock | SteadyClock | None = None,
     ):
         self.executor, given = executor or Executor(), transport
         transport.is_in_callback = lambda: self.executor.is_running_here
         self.tasks = self._make_tasks()
         self.recorder = recorder  #: A `Recorder`, whose module is loaded only if there is one.
-        machine_clock = SteadyClock()
         if recorder is not None:
             transport = recorder.attach(transport, self.executor)
             self.tasks.on_turn = recorder.task
-            machine_clock = recorder.clock
+            machine_clock = machine_clock or recorder.clock
+        machine_clock = machine_clock or SteadyClock()
         self.transport = transport
         self.topics = Topics(transport)
         self.clock: SimulatedClock | SteadyClock = clock or (

@@ -21,6 +21,7 @@ from crazyflie_utils.context import Flights
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.server import leaves
 from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Converted
 from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch, bounded_master, namesake
@@ -91,7 +92,7 @@ def _path(program):
 def _node_classes(value):
     if not isinstance(value, dict) or not value:
         raise ValueError
-    return {TOPIC(name): _node_class(path) for name, path in _leaves(value)}
+    return {TOPIC(name): _node_class(path) for name, path in leaves(value)}
 
 
 #: The nodes of a process: a dictionary of name to class.
@@ -106,15 +107,6 @@ class ComposedParameters(Parameters):
     """Parameters of a process of many nodes."""
 
     nodes: dict[str, type[Node]] = parameter(NODE_CLASSES, 'node name to "package.module:Class"')
-
-
-def _leaves(tree, prefix=""):
-    # For the parameter server, a name such as cf1/simulator is a tree.
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            yield from _leaves(value, f"{prefix}{key}/")
-        else:
-            yield prefix + key, value
 
 
 def _node_class(path):

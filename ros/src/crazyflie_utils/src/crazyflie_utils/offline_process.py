@@ -6,7 +6,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils.node import Node, Process
-from crazyflie_utils.timers import Executor, SimulatedClock, TimerQueue
+from crazyflie_utils.timers import Executor, SimulatedClock
 from crazyflie_utils.topics import Transport
 
 #: Period at which a timer of period 0 fires here (s); on a real machine it fires as often as
@@ -43,12 +43,10 @@ class OfflineProcess(Process):
         recorder: Any = None,
         executor: Executor | None = None,
     ):
-        super().__init__(transport, True, WallClock(), recorder, executor)
-        self.clock.set(start)
         self.machine_clock = SimulatedClock()
         self.machine_clock.set(start)
-        tf = self.transforms.before_timers, self.transforms.send_gathered
-        self._steady = TimerQueue(self.executor, self.machine_clock, *tf)
+        super().__init__(transport, True, WallClock(), recorder, executor, self.machine_clock)
+        self.clock.set(start)
         self.machine_clock.on_change(lambda now, _: self._steady.run_due(now))
         if recorder is not None:
             recorder.wall = lambda: round(self.clock.wall_offset * 1e9)

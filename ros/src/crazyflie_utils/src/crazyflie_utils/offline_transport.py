@@ -164,9 +164,6 @@ class OfflineTransport(Transport):
         self.log_records.append((level, text))
         self.on_log(level, text)
 
-    def clock_was_set(self, stamp: genpy.Time) -> None:
-        """Do nothing."""
-
 
 def refuse(service: str) -> Callable[[Any], Future[Any]]:
     """Return the function that answers calls of a missing service."""

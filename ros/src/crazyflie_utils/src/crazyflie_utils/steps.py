@@ -1,7 +1,8 @@
 """Work in steps, which waits for futures: as a generator that yields them."""
 
 from collections.abc import Callable, Generator
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
 from functools import partial
 from typing import Any, TypeVar
 
@@ -38,3 +39,14 @@ def follow(steps: Steps[Result], submit: Callable[..., None] | None = None) -> "
 
     go_on(None)
     return outcome
+
+
+def copy_outcome(done: Future[Any], to: Future[Any]) -> None:
+    """Complete a future with the outcome of another, unless it is done or cancelled."""
+    if not done.cancelled():
+        # The other one may be completed by another thread at any moment.
+        with suppress(InvalidStateError):
+            if error := done.exception():
+                to.set_exception(error)
+            else:
+                to.set_result(done.result())

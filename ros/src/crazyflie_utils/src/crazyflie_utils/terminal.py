@@ -13,7 +13,7 @@ _SHOWN_AFTER = 2.0  #: Time from which on a wait is shown (s).
 _PERIOD = 0.5  #: Period at which its line is written again (s).
 _CLEAR = "\r\x1b[K"
 
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _STAMP = re.compile(r"(?<=\] )\[[\d.]+(, [\d.]+)?\]: ")
 _WARNING = re.compile(r"\[ *(WARN|ERROR|FATAL)\]|RLException|process has died|Traceback \(most")
 
@@ -66,7 +66,7 @@ def copy_output(
     is_traceback = False
     with log.open("w") as file:
         for coloured in output:
-            line = _COLOUR.sub("", coloured).rstrip("\n")
+            line = COLOUR.sub("", coloured).rstrip("\n")
             file.write(f"{line}\n")
             file.flush()
             on_line(line)

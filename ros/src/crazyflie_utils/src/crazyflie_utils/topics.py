@@ -141,8 +141,7 @@ class Transport(ABC):
     def log(self, level: str, text: str) -> None:
         """Log at ``level``: debug, info, warn, error or fatal."""
 
-    @abstractmethod
-    def clock_was_set(self, stamp: genpy.Time) -> None:
+    def clock_was_set(self, stamp: genpy.Time) -> None:  # noqa: B027 - Most have no clock.
         """Set the transport's clock: this process, which publishes /clock, moved to ``stamp``."""
 
 

@@ -16,7 +16,6 @@ import time
 import zlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from contextlib import AbstractContextManager
 from enum import Enum
 from functools import partial
 from itertools import count
@@ -30,6 +29,7 @@ from typing_extensions import override
 
 from crazyflie_utils import text_file
 from crazyflie_utils.journal.journal_file import ORIGIN, PLAIN, JournalWriter, Kind
+from crazyflie_utils.steps import copy_outcome
 from crazyflie_utils.timers import Executor, SteadyClock
 from crazyflie_utils.topics import (
     Condition,
@@ -157,7 +157,7 @@ class Recorder:
         self._unchecked: list[genpy.Message] = []
         self._callers: dict[tuple[str, str], int] = {("", ""): 0}
 
-    def attach(self, transport: Transport, executor: Executor) -> "RecordingTransport":
+    def attach(self, transport: Transport, executor: Executor) -> Any:
         """Begin to record; return the transport that the process is to use."""
         self.executor = executor
         self.clock = RecordedClock(self, executor)
@@ -399,8 +399,8 @@ class _RecordedSubscriber(ExternalSubscriber):
         self.external.close()
 
 
-class RecordingTransport(Transport):
-    """Passes everything on to another transport, and writes what comes back."""
+class RecordingTransport:
+    """Passes everything on to a `Transport`, and writes what comes back."""
 
     def __init__(self, transport: Transport, recorder: Recorder):
         self._transport, self._recorder = transport, recorder
@@ -410,17 +410,13 @@ class RecordingTransport(Transport):
         self._requests, self._flags = count(1), count(1)
 
     def __getattr__(self, name: str) -> Any:
-        # The others, and what tests look at.
+        # What is only passed on, and what tests look at.
         return getattr(self._transport, name)
 
     def _flag(self, read: Condition) -> _Flag:
         number = next(self._flags)
         flag = self._recorder.flags[number] = _Flag(self._recorder.executor, number, read)
         return flag
-
-    def starting(self) -> AbstractContextManager[None]:
-        """See `Transport.starting`."""
-        return self._transport.starting()
 
     def remap(self, name: str) -> str:
         """Return a remapped name; the first time, it is written."""
@@ -473,10 +469,6 @@ class RecordingTransport(Transport):
         own.external = self._transport.subscribe(topic, keeping, own.receive, may_wait)
         own.flag = self._flag(own.external.has_publishers)
         return own
-
-    def collect(self) -> None:
-        """Deliver the messages that wait."""
-        self._transport.collect()
 
     def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
         """Offer a service; its calls come in turn."""
@@ -542,22 +534,3 @@ class RecordingTransport(Transport):
     def random_seed(self) -> int:
         """Return a random seed."""
         return self._recorder.value("seed", self._transport.random_seed)
-
-    def log(self, level: str, text: str) -> None:
-        """Log."""
-        self._transport.log(level, text)
-
-    def clock_was_set(self, stamp: genpy.Time) -> None:
-        """Set the transport's clock."""
-        self._transport.clock_was_set(stamp)
-
-
-def copy_outcome(done: "Future[Any]", to: "Future[Any]") -> None:
-    """Complete a future with the outcome of another, unless it is done or cancelled."""
-    if to.done() or done.cancelled():
-        return
-    error = done.exception()
-    if error is None:
-        to.set_result(done.result())
-    else:
-        to.set_exception(error)

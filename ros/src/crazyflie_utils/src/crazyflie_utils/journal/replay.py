@@ -34,7 +34,7 @@ from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.program import load
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.tasks import Tasks
-from crazyflie_utils.timers import Executor, SimulatedClock, SteadyClock, TimerQueue
+from crazyflie_utils.timers import Executor, SteadyClock
 
 _U64, _MOMENT = struct.Struct("<Q"), struct.Struct("<d")
 
@@ -199,10 +199,8 @@ class _RosProcess(_ReplayProcess):
 
     def __init__(self, transport: ReplayTransport, clock: str, executor: Executor, rows: Rows):
         self.machine = _ReplayClock(rows, executor)
-        simulated = SimulatedClock() if clock == "simulated" else self.machine
-        super().__init__(transport, clock == "simulated", simulated, executor=executor)
-        tf = self.transforms.before_timers, self.transforms.send_gathered
-        self._steady = TimerQueue(executor, self.machine, *tf)
+        is_simulated = clock == "simulated"
+        super().__init__(transport, is_simulated, executor=executor, machine_clock=self.machine)
 
     @override
     def machine_time(self) -> float:

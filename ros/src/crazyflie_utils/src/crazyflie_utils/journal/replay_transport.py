@@ -342,6 +342,3 @@ class ReplayTransport(Transport):
     def log(self, level: str, text: str) -> None:
         """Pass a text on."""
         self.on_log(level, text)
-
-    def clock_was_set(self, stamp: genpy.Time) -> None:
-        """Do nothing."""

@@ -50,7 +50,7 @@ class PrivateParameters:
         """Return the node's parameters that are not among, or below, absolute names, as words."""
         names = [name.removeprefix(self._prefix) for name in known if name.startswith(self._prefix)]
         found = []
-        for path in _leaves(self._own):
+        for path, _ in leaves(self._own):
             if any(f"{path}/".startswith(f"{name}/") for name in names):
                 continue
             near = difflib.get_close_matches(path, names, 1)
@@ -75,12 +75,13 @@ class PrivateParameters:
         return value
 
 
-def _leaves(tree: Any, path: str = "") -> Iterator[str]:
+def leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each parameter in a tree of dictionaries, in which "/" is a level."""
     if not isinstance(tree, dict):
-        yield path
+        yield path, tree
         return
     for key, value in tree.items():
-        yield from _leaves(value, f"{path}/{key}" if path else str(key))
+        yield from leaves(value, f"{path}/{key}" if path else str(key))
 
 
 class ParameterWriter:

@@ -17,6 +17,7 @@ from rospy.impl.tcpros_base import TCPROSTransport
 
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.ros1.master_watch import NO_ANSWER, bounded_master
+from crazyflie_utils.steps import copy_outcome
 from crazyflie_utils.topics import Serve
 
 #: Longest time that the caller of a service waits while simulated time stands still (s of the
@@ -110,7 +111,7 @@ class ServiceCaller:
             for own, request, future, call in calls:
                 if own.service.resolved_name in ours:
                     answer = own.serve(request, future.done)
-                    answer.add_done_callback(partial(_pass_on, future))
+                    answer.add_done_callback(partial(copy_outcome, to=future))
                 else:
                     call()
 
@@ -225,14 +226,6 @@ def _call(connection, request, limit, future):
             future.set_result(response)
     finally:
         connection.close()
-
-
-def _pass_on(future, answer):
-    if error := answer.exception():
-        _fail(future, str(error))
-    else:
-        with contextlib.suppress(InvalidStateError):
-            future.set_result(answer.result())
 
 
 def _reason(error):

@@ -10,10 +10,11 @@ from typing import Any
 
 import genpy
 
-from crazyflie_utils.journal.recording import Recorder, copy_outcome
+from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.node import Node
 from crazyflie_utils.offline_process import pass_time
 from crazyflie_utils.offline_transport import refuse
+from crazyflie_utils.steps import copy_outcome
 from crazyflie_utils.testing.fake_process import FakeProcess
 from crazyflie_utils.testing.fake_transport import FakeTransport
 from crazyflie_utils.topics import Condition, ExternalPublisher, ExternalSubscriber, Receiver, never

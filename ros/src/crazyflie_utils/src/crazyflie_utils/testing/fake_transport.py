@@ -6,9 +6,9 @@ from typing import Any
 
 from typing_extensions import override
 
-from crazyflie_utils.journal.recording import copy_outcome
 from crazyflie_utils.offline_transport import OfflineTransport
 from crazyflie_utils.refusal import ServiceError
+from crazyflie_utils.steps import copy_outcome
 from crazyflie_utils.timers import TimerQueue
 
 

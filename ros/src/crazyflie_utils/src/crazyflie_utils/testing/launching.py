@@ -14,12 +14,11 @@ from roslaunch.core import RLException
 from roslaunch.xmlloader import XmlParseException
 
 from crazyflie_utils.launch_file import unknown_arguments
-from crazyflie_utils.terminal import waiting
+from crazyflie_utils.terminal import COLOUR, waiting
 from crazyflie_utils.testing.programs import free_port, running
 
 _START_LIMIT = 60.0  #: Longest time until roslaunch's master answers (s).
 
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
 
 
@@ -29,7 +28,7 @@ class LaunchError(Exception):
 
 def complaints(log: Path) -> list[str]:
     """Return the lines with errors in a roslaunch's output."""
-    lines = [_COLOUR.sub("", line) for line in log.read_text(errors="replace").splitlines()]
+    lines = [COLOUR.sub("", line) for line in log.read_text(errors="replace").splitlines()]
     return [line for line in lines if _COMPLAINT.search(line)]
 
 

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from queue import SimpleQueue
 
 import pytest
 from geometry_msgs.msg import PointStamped
@@ -23,6 +24,7 @@ from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.testing import FakeGraph, FakeProcess
+from crazyflie_utils.testing.programs import wait_until
 
 END = "end"  #: A text upon which `DyingNode` dies.
 
@@ -70,6 +72,25 @@ class ListenNode(Node):
 
     def on_point(self, message):
         self.last = message.point
+
+
+class WaitingNode(Node):
+    """Has a task that waits for something outside."""
+
+    def __init__(self):
+        self.answers = SimpleQueue()
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        self.out = handle.publisher("/out", String)
+        handle.task("wait", self.wait)
+
+    def wait(self):
+        for number in range(3):
+            answer = self._handle.value("answer", self.answers.get, waits=True)
+            self.out.publish(String(f"{number} {answer}"))
 
 
 class DyingNode(Node):
@@ -183,6 +204,28 @@ def test_the_debugger_stops_in_the_callback_at_the_printed_time(folder, capsys, 
     assert "(Pdb) 5.5" in text
     assert "identical until the debugger was left" in text
     assert sys.gettrace() is None or "pdb" not in repr(sys.gettrace())
+
+
+@pytest.mark.parametrize(
+    ("moment", "shown"),
+    [(0.0, "for number in range(3)"), (1.5, "1 second"), (2.5, "2 third")],
+)
+def test_the_debugger_stops_in_a_task(tmp_path, capsys, monkeypatch, moment, shown):
+    """Where it begins, or where it goes on after it has waited."""
+    node, process = WaitingNode(), FakeProcess(recorder=recorder(tmp_path, "/wait", 100.0))
+    assert process.launch(node, "/wait")
+    for k, text in enumerate(("first", "second", "third"), 1):
+        process.advance(1.0)
+        node.answers.put(text)
+        wait_until(lambda k=k: len(process.published("/out")) == k, "the task")
+    process.recorder.close()
+    command = "n\np str(number), answer\n" if moment else ""
+    monkeypatch.setattr(sys, "stdin", io.StringIO(f"{command}q\n"))
+    status, text = run_program(capsys, tmp_path / "wait.journal", "--break-at", moment)
+    assert status == 0
+    assert "wait()" in text
+    assert (repr(tuple(shown.split())) if moment else shown) in text
+    assert "identical until the debugger was left" in text
 
 
 def test_the_debugger_takes_one_journal(folder, capsys):

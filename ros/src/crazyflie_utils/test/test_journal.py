@@ -7,9 +7,10 @@ from concurrent.futures import Future
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PointStamped
 from hypothesis import given
 from hypothesis import strategies as st
-from std_msgs.msg import Empty, Float32, Float64, String
+from std_msgs.msg import Empty, Float32, Float64, Header, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest
 
 from crazyflie_utils import Node
@@ -28,6 +29,7 @@ from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing.fake_transport import FakeTransport
 
 HEADER = {"node": "/mean", "program": "", "clock": "manual", "start": 100.0, "us": 0}
 
@@ -219,6 +221,92 @@ def test_nodes_are_given_the_digits_that_are_written(path):
     told = [message.data for message in process.published("/text")]
     assert [message.data for _, message in run_again(path).published] == told
     assert told == [repr(float(np.float32(0.1))), "True", "True"]
+
+
+class LatestNode(Node):
+    """Tells what was the latest message when it is asked, and by its timer."""
+
+    def __init__(self):
+        self.latest = 0.0
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        self.text = handle.publisher("/text", String)
+        handle.advertise_service("/ask", Trigger, lambda _: self.tell("asked"))
+        handle.subscribe("/in", Float64, self.on_in, latest_only=True)
+        handle.timer(0.1, lambda: self.tell("timer"), steady=True)
+
+    def on_in(self, message):
+        self.latest = message.data
+
+    def tell(self, why):
+        self.text.publish(String(f"{why} {self.latest:g}"))
+
+
+class SocketTransport(FakeTransport):
+    """Messages wait until they are collected."""
+
+    def __init__(self):
+        super().__init__({})
+        self.waiting = []
+
+    def collect(self):
+        while self.waiting:
+            self.deliver("/in", Float64(self.waiting.pop(0)))
+
+
+@pytest.mark.parametrize("has_journal", [False, True])
+def test_messages_that_wait_come_before_calls_and_timers(path, has_journal):
+    recorder = Recorder(JournalWriter(path, HEADER, 1e9, print)) if has_journal else None
+    transport = SocketTransport()
+    process = FakeProcess(transport=transport, recorder=recorder)
+    assert process.launch(LatestNode(), "/latest")
+    transport.waiting += [1.0, 2.0]
+    process.call("/ask", TriggerRequest())
+    transport.waiting += [3.0, 4.0]
+    process.advance(0.1)
+    told = [message.data for message in process.published("/text")]
+    assert told == ["asked 2", "timer 4"]
+    if recorder is not None:
+        recorder.close()
+        replay = run_again(path)
+        assert [message.data for _, message in replay.published] == told
+        assert replay.rows.counts[Kind.MESSAGE] == 4
+
+
+class OddNode(Node):
+    """Publishes a message that cannot be sent, and one without a frame."""
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        self.text = handle.publisher("/text", String)
+        self.point = handle.publisher("/point", PointStamped)
+        handle.timer(0.1, self.on_timer)
+
+    def on_timer(self):
+        self.point.publish(PointStamped(header=Header(frame_id=None)))
+        self.text.publish(String(5))
+
+    def enter_safe_state(self):
+        self.text.publish(String("safe"))
+
+
+def test_messages_that_cannot_be_sent_fail_again(path):
+    recorder = Recorder(JournalWriter(path, HEADER, 1e9, print))
+    process = FakeProcess(recorder=recorder)
+    assert process.launch(OddNode(), "/odd")
+    process.advance(0.1)
+    recorder.close()
+    [error] = process.logged("error")
+    replay = run_again(path)
+    assert [text.splitlines()[-1] for level, text in replay.logged if level == "error"] == [
+        error.splitlines()[-1]
+    ]
+    assert [topic for topic, _ in replay.published] == ["/point", "/text"]
 
 
 def test_what_a_thread_registers_has_its_name(path):

@@ -8,6 +8,7 @@ import io
 import pdb
 import pstats
 import sys
+import threading
 import time
 import traceback
 from collections import defaultdict, deque
@@ -25,6 +26,7 @@ from crazyflie_utils import handle
 from crazyflie_utils.journal.journal_file import INPUTS, Journal, JournalError, Kind, SourcesError
 from crazyflie_utils.journal.replay import Replay
 from crazyflie_utils.journal.replay_transport import DifferenceError, EndError
+from crazyflie_utils.tasks import Tasks
 
 _REMEMBERED = 200  #: Last messages of each topic, to find the one that is others.
 _MAX_NOTES = 20  #: Lines about a journal, tracebacks counted as one.
@@ -122,14 +124,15 @@ class _Run:
         """Return the outcome."""
         replay, journal = self._replay, self._journal
         try:
-            with replay, _tracing() as trace_callbacks:
+            with replay, _stopping(replay.process.tasks) as stop:
                 self._start()
                 while replay.rows.next is not None:
                     if replay.rows.next.kind in INPUTS:
                         begin, self._inputs = replay.rows.next_time, self._inputs + 1
                         self._report(begin, journal.position, self._inputs)
                         if break_at is not None and begin >= break_at - _HALF_US:
-                            break_at = trace_callbacks()
+                            break_at = None
+                            stop()
                     self._survive(replay.step)
         except DifferenceError as error:
             return self._different(error)
@@ -245,12 +248,12 @@ class _Run:
 
 
 def _guarded_callback(frame: FrameType | None) -> Any:
-    """Return the callback of a node that a frame of its handle calls; None of other frames."""
+    """Return the callback, or task, of a node that a frame of its handle calls, or None."""
     if frame is None or frame.f_code.co_filename != handle.__file__:
         return None
     # Others only register it.
     is_inner = "<locals>" in frame.f_code.co_qualname
-    return frame.f_locals.get("callback") if is_inner else None
+    return frame.f_locals.get("callback", frame.f_locals.get("work")) if is_inner else None
 
 
 def _name(callback: Any) -> str:
@@ -274,18 +277,48 @@ class _Debugger(pdb.Pdb):
 
 
 @contextlib.contextmanager
-def _tracing():
-    """Give a function that has a debugger stop in the next callback of a node."""
+def _stopping(tasks: Tasks) -> Iterator[Callable[[], None]]:
+    """Give a function that has a debugger stop in the next callback, or where a task goes on."""
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
         callback = _guarded_callback(frame.f_back)
-        if callback is None or _code(callback) is not frame.f_code:
+        if not is_awaited or callback is None or _code(callback) is not frame.f_code:
             return None
+        is_awaited.clear()
         debugger.set_trace(frame)
         return debugger.trace_dispatch
 
+    def go_on(frame: FrameType, event: str, argument: Any) -> Any:
+        debugger.set_trace(frame)
+        return debugger.trace_dispatch(frame, event, argument)
+
+    def on_turn(_: int) -> None:
+        # Each task has a thread, and tracing is that of a thread.
+        if is_awaited:
+            sys.settrace(trace)
+            if frame := _waiting_frame():
+                is_awaited.clear()
+                frame.f_trace = go_on
+
+    def stop() -> None:
+        is_awaited.append(True)
+        sys.settrace(trace)
+
+    is_awaited: list[bool] = []
     debugger = _Debugger()
+    tasks.on_turn = on_turn
     try:
-        yield lambda: sys.settrace(trace)
+        yield stop
     finally:
         sys.settrace(None)
+
+
+def _waiting_frame() -> FrameType | None:
+    """Return the frame of a node whose task has waited; None if it has only begun."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if file != __file__ and not file.startswith(_UTILS):
+            return None if file == threading.__file__ else frame
+        frame = frame.f_back
+    return None

@@ -1,6 +1,5 @@
 """The outside of a process without ROS: its parameters, what it publishes, what is delivered."""
 
-import io
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -16,6 +15,7 @@ from crazyflie_utils.topics import (
     Receiver,
     Serve,
     Transport,
+    framed,
     never,
 )
 
@@ -28,12 +28,14 @@ class _Publication(ExternalPublisher):
     def has_subscribers(self) -> bool:
         return True
 
-    def publish(self, *messages: genpy.Message) -> None:
+    def publish(self, *messages: genpy.Message) -> bytes | None:
+        sent = None
         for message in messages:
             # A message that cannot be serialized must fail here as it would on a wire.
-            message.serialize(io.BytesIO())
+            sent = framed(message)
             self.messages.append(message)
             self._transport.on_publish(self._topic, message)
+        return sent
 
     def close(self) -> None:
         pass

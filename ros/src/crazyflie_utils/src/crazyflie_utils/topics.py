@@ -6,7 +6,9 @@ change it. Messages are sent to other processes only if these subscribe. A `Tran
 the same for both.
 """
 
+import io
 import secrets
+import struct
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -15,6 +17,8 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import genpy
+
+LENGTH = struct.Struct("<I")  #: Before each message on a connection: its length (bytes).
 
 Receiver = Callable[[Any], None]
 Condition = Callable[[], bool]
@@ -28,19 +32,40 @@ def never() -> bool:
     return False
 
 
+def framed(message: genpy.Message, number: int | None = None) -> bytes:
+    """Return a message as it is sent: serialized, behind its length.
+
+    As rospy does, it gets a sequence number, if there is one, and a frame.
+    """
+    if message._has_header:
+        header = message.header
+        if number is not None:
+            header.seq = number
+        if header.frame_id is None:
+            header.frame_id = "0"
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    body = buffer.getvalue()
+    return LENGTH.pack(len(body)) + body
+
+
 class ExternalPublisher(ABC):
     """Publishes one topic to other processes."""
 
-    #: Called with every message that is published, also if nobody outside subscribes.
-    note: Callable[[genpy.Message], None] | None = None
+    #: Called with every message that is published, also if nobody outside subscribes, and with what
+    #: `publish` has returned, or None.
+    note: Callable[[genpy.Message, bytes | None], None] | None = None
 
     @abstractmethod
     def has_subscribers(self) -> bool:
         """Return whether another process subscribes."""
 
     @abstractmethod
-    def publish(self, *messages: genpy.Message) -> None:
-        """Send messages to other processes."""
+    def publish(self, *messages: genpy.Message) -> bytes | None:
+        """Send messages to other processes.
+
+        Return the last one as it was sent, see `framed`, if that is known.
+        """
 
     @abstractmethod
     def close(self) -> None:
@@ -196,12 +221,13 @@ class Publisher:
             )
         if self._is_closed:
             return
-        if self._external.note is not None:
-            self._external.note(message)
+        external, sent = self._external, None
         if self._latch:
             self.latched = message
-        if self._latch or self._external.has_subscribers():
-            self._external.publish(*before, message)
+        if self._latch or external.has_subscribers():
+            sent = external.publish(*before, message)
+        if external.note is not None:
+            external.note(message, sent)
         for receiver in topic.receivers:
             receiver(message)
 

@@ -9,7 +9,6 @@ While an input is processed, the clock stands still: callbacks see the moment at
 """
 
 import builtins
-import io
 import json
 import struct
 import time
@@ -32,12 +31,14 @@ from crazyflie_utils.journal.journal_file import ORIGIN, PLAIN, JournalWriter, K
 from crazyflie_utils.steps import copy_outcome
 from crazyflie_utils.timers import Executor, SteadyClock
 from crazyflie_utils.topics import (
+    LENGTH,
     Condition,
     ExternalPublisher,
     ExternalSubscriber,
     Receiver,
     Serve,
     Transport,
+    framed,
     never,
 )
 
@@ -77,13 +78,11 @@ def plain_type(message_type: Any) -> Any:
 
 def serialized(message: genpy.Message) -> bytes:
     """Return a message as bytes; empty if it cannot be serialized."""
-    buffer = io.BytesIO()
     try:
-        message.serialize(buffer)
-    except (genpy.SerializationError, struct.error, TypeError):
+        return framed(message)[LENGTH.size :]
+    except (genpy.SerializationError, struct.error, TypeError, AttributeError, ValueError):
         # Whoever sends it will say so.
         return b""
-    return buffer.getvalue()
 
 
 class Digest:
@@ -92,10 +91,17 @@ class Digest:
     def __init__(self) -> None:
         self.value = 0
 
-    def add(self, message: genpy.Message) -> int:
-        """Add a message, without the sequence number, which rospy sets; return the last byte."""
-        data = getattr(message, "raw", None) or serialized(message)
-        self.value = zlib.crc32(data[4:] if message._has_header else data, self.value)
+    def add(self, message: genpy.Message, sent: bytes | None = None) -> int:
+        """Add a message, without the sequence number, which rospy sets; return the last byte.
+
+        ``sent`` is what `ExternalPublisher.publish` has returned.
+        """
+        begin = 4 if message._has_header else 0
+        if sent is None:
+            sent = getattr(message, "raw", None) or serialized(message)
+        else:
+            begin += LENGTH.size
+        self.value = zlib.crc32(sent[begin:] if begin else sent, self.value)
         return self.value & 0xFF
 
 
@@ -149,12 +155,13 @@ class Recorder:
         #: Returns wall clock minus the process's clock (ns).
         self.wall: Callable[[], int] = lambda: 0
         self.look_period = _LOOK_PERIOD  #: Time between two looks at what is to be written (us).
-        self._next_look = self._next_flags = 0
+        self._next_look = self._next_flags = 0  # (us).
+        self.is_collecting = False  #: Whether messages are collected for the next turn.
         self.flags: dict[int, _Flag] = {}  #: Of all topics, by their numbers.
         self._last = int(writer.header["us"])
         self._wall = 0
         self._digest = Digest()
-        self._unchecked: list[genpy.Message] = []
+        self._unchecked: list[tuple[genpy.Message, bytes | None]] = []
         self._callers: dict[tuple[str, str], int] = {("", ""): 0}
 
     def attach(self, transport: Transport, executor: Executor) -> Any:
@@ -173,18 +180,22 @@ class Recorder:
         self.clock.now = now * 1000
         try:
             if now >= self._next_look:
-                self._next_look = now + self.look_period
-                if now >= self._next_flags:
-                    self._next_flags = now + 10 * self.look_period
-                    self._look_at_flags()
-                if len(self._unchecked) >= _CHECKED_TOGETHER or not self.look_period:
-                    self._check()
-                self._writer.pause(now * 1e-6)
+                self._look(now)
             passed = now - self._last
             self._last = now
             self.row(kind, number, passed if passed < _LONGEST else _LONGEST, data)
         except Exception as error:
             self._writer.end(repr(error))
+
+    def _look(self, now):
+        """Look at what is written now and then; ``now`` is in us."""
+        self._next_look = now + self.look_period
+        if now >= self._next_flags:
+            self._next_flags = now + 10 * self.look_period
+            self._look_at_flags()
+        if len(self._unchecked) >= _CHECKED_TOGETHER or not self.look_period:
+            self._check()
+        self._writer.pause(now * 1e-6)
 
     def look_at_wall(self, is_read: bool = False) -> int:
         """Return by how much the wall clock is ahead of the machine's (ns); write changes."""
@@ -206,7 +217,7 @@ class Recorder:
         self.look_at_wall()
         if self._unchecked:
             add = self._digest.add
-            self.row(_CHECKED, 0, 0, bytes([add(each) for each in self._unchecked]))
+            self.row(_CHECKED, 0, 0, bytes([add(*each) for each in self._unchecked]))
             self._unchecked.clear()
 
     def submit_input(self, number: int, work: Callable[..., None], *arguments: Any) -> None:
@@ -264,12 +275,12 @@ class Recorder:
         self.row(Kind.FILE, 1, 0, name + b"\n" + content)
         return content
 
-    def published(self, number: int, message: genpy.Message) -> None:
-        """Write that a callback publishes a message."""
+    def published(self, number: int, message: genpy.Message, sent: bytes | None) -> None:
+        """Write that a callback has published a message."""
         if self.executor._runner == get_ident() or self.executor.is_in_turn:
             try:
                 self.row(_PUBLISHED, number, 0)
-                self._unchecked.append(message)
+                self._unchecked.append((message, sent))
             except Exception as error:
                 self._writer.end(repr(error))
 
@@ -362,15 +373,29 @@ class _Flag:
 class _RecordedSubscriber(ExternalSubscriber):
     """A subscription, whose messages are inputs."""
 
-    def __init__(self, recorder: Recorder, number: int, plain: Any, deliver: Receiver):
+    def __init__(
+        self,
+        recorder: Recorder,
+        number: int,
+        plain: Any,
+        deliver: Receiver,
+        is_collected: bool,
+    ):
         self.external: ExternalSubscriber
         self.flag: _Flag
         self._recorder, self._number = recorder, number
         self._plain_type, self._deliver = plain, deliver
+        post = partial(recorder.executor.post, self._pass_on)
         #: Writes a message and passes it on, in its turn. Not a method: called for each message.
-        self.receive = partial(recorder.executor.post, self._pass_on)
+        self.receive: Receiver = self._collect if is_collected else post
         self._header: dict[str, str] | None = None
         self._origin = ORIGIN.pack(0)
+
+    def _collect(self, message):
+        """Write a message and pass it on, in its turn, or in that for which it is collected."""
+        executor = self._recorder.executor
+        take = executor.enqueue if self._recorder.is_collecting else executor.post
+        take(self._pass_on, message)
 
     def _pass_on(self, message):
         header = getattr(message, "_connection_header", None)
@@ -463,12 +488,20 @@ class RecordingTransport:
         self._recorder.name(Kind.SUBSCRIBED, number, topic, message_type._type)
         # Otherwise a message that came decoded is the same.
         plain = plain_type(message_type) if plain_type(message_type) != message_type else None
-        own = _RecordedSubscriber(self._recorder, number, plain, deliver)
+        own = _RecordedSubscriber(self._recorder, number, plain, deliver, may_wait is not never)
         keeping = keeps_data(message_type)
         # Messages may come before this returns.
         own.external = self._transport.subscribe(topic, keeping, own.receive, may_wait)
         own.flag = self._flag(own.external.has_publishers)
         return own
+
+    def collect(self) -> None:
+        """Deliver the messages that wait, for a turn that follows."""
+        self._recorder.is_collecting = True
+        try:
+            self._transport.collect()
+        finally:
+            self._recorder.is_collecting = False
 
     def advertise_service(self, name: str, service_type: Any, serve: Serve) -> Callable[[], None]:
         """Offer a service; its calls come in turn."""
@@ -476,6 +509,9 @@ class RecordingTransport:
         recorder.name(Kind.OFFERED, number, name, service_type._type)
 
         def begin(request: Any, is_withdrawn: Condition) -> Future[Any]:
+            # In its turn it is too late for that.
+            if not recorder.executor.is_in_turn:
+                self.collect()
             answer: Future[Any] = Future()
 
             def run():

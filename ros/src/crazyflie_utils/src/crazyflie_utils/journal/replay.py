@@ -142,6 +142,7 @@ class _ReplayTasks(Tasks):
             del self._batons[number]
             raise EndError
         self._own.number, self._executor._runner = number, threading.get_ident()
+        self.on_turn(number)
 
 
 class _ReplayClock(SteadyClock):

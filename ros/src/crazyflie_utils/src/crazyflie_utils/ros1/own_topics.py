@@ -7,10 +7,8 @@ every subscriber, which takes more time than the message. Here the publisher's t
 as the socket accepts; only a subscriber that does not keep up gets a thread.
 """
 
-import io
 import select
 import socket
-import struct
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -24,24 +22,9 @@ from typing_extensions import override
 
 from crazyflie_utils.ros1 import master_watch
 from crazyflie_utils.ros1.receiving import Reception, Report, validate_header
-from crazyflie_utils.topics import Condition, Receiver
-
-_LENGTH = struct.Struct("<I")
+from crazyflie_utils.topics import Condition, Receiver, framed
 
 _NO_WAIT = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
-
-
-def serialized(message: genpy.Message, number: int) -> bytes:
-    """Return a serialized message, with a sequence number in its header, if it has one."""
-    if message._has_header:
-        header = message.header
-        header.seq = number
-        if header.frame_id is None:
-            header.frame_id = "0"
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    body = buffer.getvalue()
-    return _LENGTH.pack(len(body)) + body
 
 
 class NonBlockingConnection:
@@ -226,19 +209,23 @@ class OwnPublication(rospy.topics._PublisherImpl):
     def add_connection(self, c: Any) -> bool:
         return super().add_connection(NonBlockingConnection(c, self._limit))
 
-    def send(self, messages: tuple[genpy.Message, ...]) -> None:
-        """Publish messages that are of the topic's type, all at once."""
+    def send(self, messages: tuple[genpy.Message, ...]) -> bytes | None:
+        """Publish messages that are of the topic's type, all at once.
+
+        Return the data that were sent, if it was one message.
+        """
         with self.publock:
             if self.is_latch:
                 self.latch = messages[-1]
             if not self.connections:
-                return
+                return None
             first = self.seq + 1
             self.seq += len(messages)
-            data = b"".join(serialized(each, first + k) for k, each in enumerate(messages))
+            data = b"".join(framed(each, first + k) for k, each in enumerate(messages))
             self.message_data_sent += len(data)
             for connection in self.connections:
                 try:
                     connection.write_data(data)
                 except (OSError, rospy.exceptions.TransportTerminated):
                     connection.close()
+            return data if len(messages) == 1 else None

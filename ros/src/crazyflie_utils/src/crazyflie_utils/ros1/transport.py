@@ -60,13 +60,13 @@ class _RosPublisher(ExternalPublisher):
         implementation = self._publisher.impl
         return implementation is not None and bool(implementation.connections)
 
-    def publish(self, *messages: genpy.Message) -> None:
+    def publish(self, *messages: genpy.Message) -> bytes | None:
         own = self._publisher.impl
         if isinstance(own, OwnPublication) and not own.closed:
-            own.send(messages)
-            return
+            return own.send(messages)
         for message in messages:
             self._publisher.publish(message)
+        return None
 
     def close(self) -> None:
         self._on_close()

@@ -242,11 +242,12 @@ class _Publication(ExternalPublisher):
     def has_subscribers(self) -> bool:
         return self._transport.graph.subscribes(self._topic, self._transport.name)
 
-    def publish(self, *messages: genpy.Message) -> None:
+    def publish(self, *messages: genpy.Message) -> bytes | None:
         for message in messages:
             if self._latch:
                 self._transport.latched[self._topic] = message
             self._transport.graph.publish(self._topic, message, self._transport.name)
+        return None
 
     def close(self) -> None:
         self._transport.advertised.remove(self._topic)

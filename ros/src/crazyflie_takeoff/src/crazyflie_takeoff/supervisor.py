@@ -247,16 +247,17 @@ def _kept(memory, facts):
 def _limited(facts, setpoint, lowest, is_ramp=False):
     motion, hover = facts.seen, facts.hover
     control = facts.limits.in_range(setpoint, lowest)
-    if is_ramp and facts.flight is FlightState.LANDING:
+    climb, lands = facts.limits.climb, facts.lands
+    if lands:
+        climb = LANDING_CLIMB
+    elif is_ramp and facts.flight is FlightState.LANDING:
         # No ramp of a landing lifts the vehicle; a restarted server assumes that it hovers at g.
         control = control._replace(thrust=min(control.thrust, hover))
-    climb = facts.limits.climb
-    if facts.lands:
-        climb = LANDING_CLIMB
+        climb, lands = 0.0, True
     elif is_ramp:
         climb = min(climb, TAKEOFF_CLIMB)
     thrust, excess = within_climb(control.thrust, hover, motion, facts.highest, climb)
-    facts.climb_excess = "" if facts.lands else excess
+    facts.climb_excess = "" if lands else excess
     z_dot = 0.0 if motion is None else motion.velocity[2]
     return within_pause(
         control._replace(thrust=thrust), facts.pauses.longest, hover, z_dot, is_ramp

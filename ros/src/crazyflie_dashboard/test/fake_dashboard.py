@@ -88,6 +88,10 @@ class FakeDashboard:
         self.typed = []
         self.picture = self.report_file = None
         self.refusals = {}
+        self.recorded = (
+            Recorded("2026-11-29_20-01-02", 75.4, 3_400_000, ("cf1", "cf2"), True),
+            Recorded("2026-11-29_19-00-00", 12.0, 1_000_000, (), False),
+        )
         self.is_slow = False  #: Whether vehicles stay where they are when they are commanded.
         self.tracked = Commands(time.monotonic)
         self.gain = ParameterInfo(
@@ -268,10 +272,7 @@ class FakeDashboard:
         return self.report_file if len(names) < 2 or names in self.made else None
 
     def recordings(self):
-        return (
-            Recorded("2026-11-29_20-01-02", 75.4, 3_400_000, ("cf1", "cf2"), True),
-            Recorded("2026-11-29_19-00-00", 12.0, 1_000_000, (), False),
-        )
+        return self.recorded
 
     def make_report(self, names):
         self.made.append(names)

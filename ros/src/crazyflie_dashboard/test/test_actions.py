@@ -356,9 +356,22 @@ def test_commands_refusals_and_control_are_logged(fleet):
     info, warn = (" | ".join(fleet.process.logged(level)) for level in ("info", "warn"))
     assert "page 1 has control" in info
     assert "page 1: take off cf1, cf2" in info
-    assert "page 1: take off cf1, cf2 to 1 m: cf2: the battery is at 2.9 V" in warn
-    assert "page 1: land cf1, cf2, cf3: the command is 3.0 s old" in warn
+    assert "page 1: take off cf1, cf2 to 1 m: refused, 0/2 accepted; cf2: the battery" in warn
+    assert "page 1: land cf1, cf2, cf3: refused, the command is 3.0 s old" in warn
     assert "page 1 has given up control" in info
+
+
+def test_a_command_is_logged_as_done_when_the_vehicle_has_arrived(fleet):
+    fleet.fly(cf1=(0.0, 0.0, 1.0))
+    fleet.command(Action.GO_TO, ["cf1"], goal=(0.0, 2.0, 1.0))
+    fleet.process.advance(1.0)
+    fleet.fly(cf1=(0.0, 1.0, 1.0))
+    line = "page 1: go to cf1 to (0.00, 2.00, 1.00) m"
+    assert [line in each for each in fleet.process.logged("info")].count(True) == 1
+    fleet.process.advance(1.0)
+    fleet.fly(cf1=(0.0, 2.0, 1.0))
+    fleet.process.advance(0.5)
+    assert f"{line}: done, after 2 s" in fleet.process.logged("info")[-1]
 
 
 def test_what_a_page_asks_for_does_not_wait_for_callbacks_of_the_node(fleet):

@@ -133,7 +133,7 @@ def test_diagnostics_are_sentences_and_the_log_has_levels(fleet):
         DiagnosticStatus(DiagnosticStatus.OK, "driver: cf3", "connected", "", []),
     ]
     fleet.process.publish("/diagnostics", DiagnosticArray(status=status))
-    fleet.process.publish("/rosout_agg", Log(level=Log.WARN, name="/a", msg="<script>alert(1)"))
+    fleet.process.publish("/rosout_agg", Log(level=Log.WARN, name="/a", msg="/a: <script>alert(1)"))
     fleet.process.advance(0.05)
     scene = fleet.dashboard.scene()
     assert [(each.level, each.text) for each in scene.sentences] == [

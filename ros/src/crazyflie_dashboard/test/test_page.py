@@ -12,7 +12,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from fake_dashboard import vehicle
+from fake_dashboard import FakeDashboard, vehicle
 from geometry_msgs.msg import Point, Vector3
 from pages import wait_for
 from selenium.webdriver.common.action_chains import ActionChains
@@ -149,6 +149,22 @@ def test_the_goal_goes_when_it_is_reached(browser, server):
     wait_for(lambda: not browser.in_scene("goal.visible"), "no goal")
 
 
+def test_a_goal_that_is_set_meanwhile_stays(browser, server):
+    server.dashboard.is_slow = True
+    server.dashboard.change("cf1", position=(-1.0, 0.0, 1.0), is_in_flight=True, state="flying")
+    browser.take_control()
+    browser.choose("cf1")
+    browser.click_floor(0.5, -0.5)
+    browser.press("Go")
+    wait_for(lambda: server.dashboard.commands, "a command")
+    browser.enter('input[aria-label="y, m"]', "0.7")
+    wait_for(lambda: browser.in_scene("goal.position.y") == 0.7, "the new goal")
+    server.dashboard.change("cf1", position=server.dashboard.commands[0].goal)
+    browser.has("done", ".strips")
+    assert browser.in_scene("goal.visible")
+    assert browser.find('input[aria-label="y, m"]').get_attribute("value") == "0.7"
+
+
 def test_identical_texts_are_one_line_and_commands_are_not(browser, server, driver):
     texts = [
         *40 * ["cf1 and cf2 are 0.30 m apart"],
@@ -258,9 +274,23 @@ def test_a_takeoff_without_a_height_is_not_sent(browser, server):
     browser.take_control()
     browser.choose("cf1")
     browser.find('input[aria-label="height, m"]').send_keys(Keys.CONTROL, "a", Keys.DELETE)
-    browser.press("Take off")
-    browser.has("take off: type a height")
+    wait_for(lambda: not browser.button("Take off").is_enabled(), "no takeoff")
+    assert browser.button("Take off").get_attribute("title") == "type a height"
+    browser.find(f"{browser.card('cf1')} button").click()
+    browser.has("take off: type a height", ".q-notification")
+    # Strips and the bar are below.
+    assert browser.find(".q-notification").rect["y"] < 300
     assert server.dashboard.commands == []
+
+
+def test_go_waits_for_a_goal(browser, server):
+    server.dashboard.change("cf1", position=(-1.0, 0.0, 1.0), is_in_flight=True, state="flying")
+    browser.take_control()
+    browser.choose("cf1")
+    why = "click on the floor, or type x, y and z"
+    wait_for(lambda: browser.button("Go").get_attribute("title") == why, "the reason")
+    browser.click_floor(0.5, -0.5)
+    wait_for(lambda: browser.button("Go").is_enabled(), "Go")
 
 
 def test_a_refusal_is_shown_in_the_words_of_the_service(browser, server):
@@ -337,6 +367,11 @@ def test_the_path_of_a_dry_run_is_drawn_once_until_another_mission_is_chosen(bro
     browser.press("Dry run")
     browser.has("The dry run has passed: 12.0 s, all land")
     wait_for_lines(1)
+    for _ in range(2):
+        browser.open()
+        browser.has("you have control", ".control")
+        wait_for(lambda: browser.button("Fly").is_enabled(), "what has passed may fly")
+        wait_for_lines(1)
     browser.select("mission or trajectory", "eight.csv")
     wait_for_lines(0)
 
@@ -406,11 +441,13 @@ def test_plots_are_kept_as_pictures_and_numbers(browser, driver):
     for text, sign in (
         ("SVG", "<svg"),
         ("PNG", "plots.pngdata:image/png;base64"),
-        ("CSV", "name,unit"),
+        ("CSV", "vehicle,field,unit"),
     ):
         browser.press(text)
         some = f"return kept.some((each) => each.startsWith({sign!r}))"
         wait_for(lambda some=some: driver.execute_script(some), text)
+    rows = driver.execute_script("return kept.find((each) => each.startsWith('vehicle'))")
+    assert rows.splitlines()[1].startswith("cf1,position z,m,-60")
 
 
 def test_an_earlier_moment_is_shown_and_nothing_is_commanded_then(browser, server, driver):
@@ -662,6 +699,8 @@ def test_all_are_reset_after_an_emergency(browser, server):
     browser.press("All")
     browser.press("Emergency")
     browser.has("To fly again: Reset", ".emergency-report")
+    wait_for(lambda: browser.button("Reset").is_displayed(), "Reset")
+    assert browser.find('input[aria-label="height, m"]').rect["width"] > 30
     browser.press("Reset")
     wait_for(lambda: server.dashboard.commands, "a command")
     assert server.actions() == [(Action.RESET, ("cf1", "cf2", "cf3"))]
@@ -723,6 +762,12 @@ def test_a_recording_is_ended_with_a_link_to_its_report(browser, server, tmp_pat
 def test_two_recordings_are_compared_on_one_page(browser, server, tmp_path):
     server.dashboard.report_file = tmp_path / "report.html"
     server.dashboard.report_file.write_text("<title>two flights</title>")
+    server.dashboard.recorded = server.dashboard.recorded[1:]
+    browser.tab("Recordings")
+    browser.has("1 recording")
+    # One that has been made while another panel was shown.
+    browser.tab("Vehicles")
+    server.dashboard.recorded = FakeDashboard().recorded
     browser.tab("Recordings")
     browser.has("2 recordings")
     browser.has("1:15", ".q-table")

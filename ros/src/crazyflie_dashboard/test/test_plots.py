@@ -9,7 +9,7 @@ import pytest
 import roslib.packages
 from geometry_msgs.msg import Point, Pose, PoseStamped
 
-from crazyflie_dashboard.page.plots_panel import AXES, chart, lines
+from crazyflie_dashboard.page.plots_panel import AXES, COLORS, chart, lines
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.plots import (
     Ring,
@@ -124,3 +124,14 @@ def test_x_y_and_z_have_one_color_in_plots_scene_and_report():
     scene = "src/crazyflie_dashboard/page/objects/vehicles.js"
     assert f"AXES = [{quoted}]" in text("crazyflie_dashboard", scene)
     assert f"COLORS = [{quoted}, " in text("crazyflie_reports", "page/plots.js")
+
+
+def test_colors_of_vehicles_can_be_read_on_a_light_page_and_on_a_dark_one():
+    def luminance(color):
+        shares = (int(color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+        linear = [c / 12.92 if c < 0.04 else ((c + 0.055) / 1.055) ** 2.4 for c in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    # The ratio of contrast that WCAG asks of graphics is 3.
+    low, high = 3 * (luminance("#1a2029") + 0.05), (luminance("#ffffff") + 0.05) / 3
+    assert all(low < luminance(color) + 0.05 < high for color in COLORS)

@@ -109,6 +109,7 @@ def test_words_are_checked_before_anything_is_launched(fly, tmp_path):
             ([f"port:={port}"], f"port {port} of 127.0.0.1 is in use by "),
             (["fleet:=none.yaml"], "none.yaml: cannot be read"),
             (["folder:=x"], "sw_swarm.launch has no argument folder; did you mean folders?"),
+            (["3", "--out", str(tmp_path), "folder:=x"], "did you mean folders?"),
         ):
             with fly(*words) as program:
                 _, errors = program.communicate(timeout=LIMIT)

@@ -22,6 +22,7 @@ def test_vehicles_are_those_that_the_script_names(script, n):
         ([__file__, "0"], "n is 0; expected one number of vehicles"),
         ([__file__, "2", "3"], "n is 2 3; expected one number"),
         ([__file__, "two"], "n is two; expected one number"),
+        ([__file__, "2", "--out", "out", "spacings:=1"], "did you mean spacing?"),
     ],
 )
 def test_bad_input_is_named_before_anything_is_launched(

@@ -11,6 +11,7 @@ from crazyflie_dev.render_rviz import (
     DisplayError,
     background_of,
     crop_to_scene,
+    main,
     material_of,
     pixels_of,
     screenshot,
@@ -97,3 +98,9 @@ def test_the_vehicle_of_the_animation_flies_and_each_line_comes_in_its_time():
     assert places[:, 1].min() == pytest.approx(top[1], abs=4.0)
     assert ((places > 0.0) & (places < (WIDTH, HEIGHT))).all()
     assert not re.search("nan|inf", vehicle.get("values"))
+
+
+def test_what_cannot_be_launched_is_named(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["render", "no_file"])
+    assert main() == 1
+    assert "no picture: roslaunch has not started anything:" in capsys.readouterr().err

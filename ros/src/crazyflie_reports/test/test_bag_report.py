@@ -310,6 +310,17 @@ def test_a_mission_that_goes_on_at_once_has_no_hover(run):
     assert "hover" not in output
 
 
+def test_the_end_of_the_climb_is_no_error_of_the_hover(run, monkeypatch):
+    """The flight begins 0.1 m below its height, which is reached in time, and has 5 s."""
+    monkeypatch.setattr(bags, "SPEED", 0.3)
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+    _, output, (flight,) = run(run.folder / "a.bag")
+    assert values(flight)["time to hover"] == pytest.approx(3.3, abs=0.05)
+    assert values(flight)["hover error, maximum"] < 10.0
+    assert "normal" in output
+
+
 def test_other_topics_and_other_names(run):
     with bags.written(run.folder / "a.bag") as bag:
         bags.write_flight(bag, "a/b")

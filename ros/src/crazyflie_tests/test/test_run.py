@@ -171,6 +171,27 @@ def test_a_word_that_is_not_there_gets_the_nearest_one(word, hint):
     assert result.stderr == f"run: there is no '{word}'; {hint}\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("install nope", "install of 'nope': expected sections of ros/debian.txt: batch "),
+        ("docs index", "docs takes no arguments, and was given 'index'"),
+        ("lint src docs", "lint takes no arguments, and was given 'src docs'"),
+        ("build demo", "build takes no arguments, and was given 'demo'"),
+        ("tests --all x", "tests takes no '--all x'"),
+        ("course 1 2", "course '1 2': expected the number of a lesson"),
+        ("swarm x", "swarm of x; expected a number of vehicles"),
+        ("mission README.md", "mission of 'README.md': expected a script that exists"),
+    ],
+)
+def test_arguments_are_refused_at_once(words, complaint):
+    result = subprocess.run(
+        [TOP / "run", *words.split()], capture_output=True, text=True, check=False, timeout=10
+    )
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr.startswith(f"run: {complaint}")
+
+
 def test_words_used_elsewhere_exist():
     usage = subprocess.run([TOP / "run", "help"], capture_output=True, text=True, check=True).stdout
     words = set(re.findall(r"^  (\w+) ", usage, re.MULTILINE))

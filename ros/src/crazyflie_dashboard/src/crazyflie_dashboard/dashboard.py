@@ -25,12 +25,11 @@ from crazyflie_dashboard.page_data import (
     ParameterInfo,
     Series,
     listed,
-    summary,
     words,
 )
 from crazyflie_dashboard.page_state import PageState
 from crazyflie_dashboard.plots import fields_of
-from crazyflie_dashboard.progress import Commands, Progress
+from crazyflie_dashboard.progress import Commands, Progress, Stage
 from crazyflie_dashboard.recording import Recorded, Recording
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_takeoff.envelope import Box
@@ -74,7 +73,7 @@ class Dashboard:
         self._turns = workers or ThreadPoolExecutor(1, "dashboard_turns")
         self._model = GraphModel(handle, self._workers, master, clock)
         self._actions = Actions(self._model, reach)
-        self._commands = Commands(clock)
+        self._commands = Commands(clock, self._log_end)
         self._compared = 0.0  # When commands were last compared with a scene (s).
         self._model.on_scene = self._compare
         self._lane = lane
@@ -159,8 +158,7 @@ class Dashboard:
         An emergency is none: it has a way of its own, `emergency`.
         """
         number = self._begin_progress(page, command.title, command.vehicles, command)
-        said = f"{command.action.value}: "
-        outcome = self._control(page, command.words, self._actions.carry_out, command, said=said)
+        outcome = self._begin(page, command.words, self._actions.carry_out, command)
         outcome.add_done_callback(lambda done: self._commands.answered(number, done))
         return outcome
 
@@ -245,7 +243,7 @@ class Dashboard:
             self._commands.follow(number)
             return end
 
-        outcome = self._control(page, f"fly {mission} for {listed(vehicles)}", do)
+        outcome = self._begin(page, f"fly {mission} for {listed(vehicles)}", do)
         outcome.add_done_callback(lambda done: self._commands.ended(number, done))
         return outcome
 
@@ -317,32 +315,35 @@ class Dashboard:
         return outcome
 
     def _control(
-        self, page: int, what: str, work: Callable[..., Any], *arguments: Any, said: str = ""
+        self, page: int, what: str, work: Callable[..., Any], *arguments: Any
     ) -> "Future[Any]":
-        """Do work as `_do` for the page that has control; log the request and its outcome.
+        """Do work as `_do` for the page that has control; log the request and its outcome."""
 
-        ``said`` is a beginning of refusals that ``what`` has, too.
-        """
-        what = f"page {page}: {what}"
+        def log(done):
+            error = done.exception()
+            self._log(bool(error), f"page {page}: {what}: {words(error) if error else 'done'}")
+
+        outcome = self._begin(page, what, work, *arguments)
+        outcome.add_done_callback(log)
+        return outcome
+
+    def _begin(
+        self, page: int, what: str, work: Callable[..., Any], *arguments: Any
+    ) -> "Future[Any]":
+        """Do work as `_do` for the page that has control; log the request."""
 
         def do():
             self.pages.expect_control(page)
             return work(*arguments)
 
-        def log(done):
-            error, result = done.exception(), None if done.exception() else done.result()
-            refused = [words(error).removeprefix(said)] if error else []
-            if isinstance(result, dict):
-                refused = summary({n: text.removeprefix(said) for n, text in result.items()})
-            if refused:
-                self._handle.warn(f"{what}: {'; '.join(refused)}")
-            else:
-                self._handle.info(f"{what}: done")
+        self._handle.info(f"page {page}: {what}")
+        return self._do(do)
 
-        self._handle.info(what)
-        outcome = self._do(do)
-        outcome.add_done_callback(log)
-        return outcome
+    def _log_end(self, row: Progress) -> None:
+        self._log(row.stage is not Stage.DONE, f"page {row.page}: {row.text}: {row.outcome}")
+
+    def _log(self, is_bad: bool, text: str) -> None:
+        (self._handle.warn if is_bad else self._handle.info)(text)
 
     def _begin_progress(self, page, title, vehicles, command=None):
         return self._commands.begin(page, title, vehicles, self._places(vehicles), command)

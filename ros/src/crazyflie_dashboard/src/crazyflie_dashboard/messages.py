@@ -28,7 +28,9 @@ _MAX_TEXT = 2000  #: Length of a line of the log (characters).
 def log_line(number: int, message: Log) -> LogLine:
     """Return a message of /rosout."""
     time, level = message.header.stamp.to_sec(), _LEVELS.get(message.level, "info")
-    return LogLine(number, time, level, message.name, message.msg[:_MAX_TEXT])
+    # Nodes of the workspace begin with their name, which the line has in front.
+    text = message.msg.removeprefix(f"{message.name}: ")
+    return LogLine(number, time, level, message.name, text[:_MAX_TEXT])
 
 
 class Diagnostics:

@@ -54,6 +54,18 @@ class Progress:
         """Whether it can still change."""
         return self.stage in OPEN
 
+    @property
+    def word(self) -> str:
+        """The word of its stage: services that answer at the end have accepted it before."""
+        is_begun = self.stage is Stage.SENT and bool(self.detail)
+        return (Stage.UNDER_WAY if is_begun else self.stage).value
+
+    @property
+    def outcome(self) -> str:
+        """What has become of it, in words."""
+        details = [each for each in (self.detail, *self.reasons) if each]
+        return f"{self.word}{', ' * bool(details)}{'; '.join(details)}"
+
 
 @dataclass
 class _Known:
@@ -68,11 +80,13 @@ class Commands:
     """The last commands of all pages.
 
     `update` and the callbacks of futures are called in the node's turn, `begin` in any thread.
-    ``time()`` is in s.
+    ``time()`` is in s; ``on_end`` is called with each command that can change no more.
     """
 
-    def __init__(self, time: Callable[[], float]):
-        self._time = time
+    def __init__(
+        self, time: Callable[[], float], on_end: Callable[[Progress], None] = lambda row: None
+    ):
+        self._time, self._on_end = time, on_end
         self._rows: dict[int, Progress] = {}
         self._known: dict[int, _Known] = {}
         self._numbers = itertools.count(1)
@@ -200,6 +214,7 @@ class Commands:
     def _end(self, row, stage, detail, reasons=()):
         self._known.pop(row.number, None)
         self._set(row, stage=stage, detail=detail, reasons=reasons, left={}, changed=self._time())
+        self._on_end(self._rows[row.number])
 
     def _set(self, row, **changes):
         self._rows[row.number] = replace(row, **changes)

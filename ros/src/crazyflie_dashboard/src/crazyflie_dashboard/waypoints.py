@@ -60,6 +60,11 @@ class Waypoints:
         """Remove all of them."""
         self._set(())
 
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a change to take back."""
+        return bool(self._before)
+
     def undo(self) -> None:
         """Take back the last change."""
         if self._before:

@@ -119,7 +119,7 @@ def main() -> int:
         "spacing:=1.8, and of the page: port:=8643, folders:=FOLDER",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the log")
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
     try:
         names, launch_arguments = vehicles_and_arguments(options.words, _DEFAULT_COUNT)
         ports = [word.partition(":=")[2] for word in launch_arguments if word.startswith("port:=")]

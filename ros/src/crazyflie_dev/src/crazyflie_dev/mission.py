@@ -109,7 +109,7 @@ def main() -> int:
                         "spacing:=1.8; n is by default the highest of the names cf1, cf2, ... in "
                         f"the script, or {_DEFAULT_COUNT}")  # fmt: skip
     parser.add_argument("--out", type=Path, help="folder for report, picture, log (out/NAME)")
-    options = parser.parse_args(arguments[:cut])
+    options = parser.parse_intermixed_args(arguments[:cut])
     script = options.script
     try:
         text = checked(script)

@@ -26,7 +26,7 @@ from crazyflie_dev.demo import HOVER
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_reports.flight_record import HOVER_TOLERANCE
 from crazyflie_utils.main import begin
-from crazyflie_utils.testing.launching import roslaunch
+from crazyflie_utils.testing.launching import LaunchError, roslaunch
 from crazyflie_utils.testing.programs import running
 
 #: Width and height in pixels of the screen, and of RViz's window in its configuration.
@@ -185,7 +185,7 @@ def main() -> int:
         log = Path(folder) / "sw_hover.log"
         try:
             render(options.output, log, options.launch_arguments)
-        except (DisplayError, FlightError) as error:
+        except (DisplayError, FlightError, LaunchError) as error:
             if log.exists():
                 print(*log.read_text().splitlines()[-_LOG_LINES:], sep="\n", file=sys.stderr)
             print(f"no picture: {error}", file=sys.stderr)

@@ -114,6 +114,9 @@ def _hover(flight: Flight) -> Iterator[Figure]:
     if point is not None and end - begin >= SHORTEST_HOVER:
         time = record.time_to_hover(point, tolerance)
         over = record.overshoot(point)
+        # A vehicle that leaves early has settled within the window.
+        if time <= HOVER_TIME_LIMIT:
+            begin = max(begin, record.events["takeoff"] + time)
         try:
             mean, largest = record.hover_error(point, min(HOVER_WINDOW, end - begin))
         except ValueError:

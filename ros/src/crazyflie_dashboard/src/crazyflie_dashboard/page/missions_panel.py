@@ -24,7 +24,8 @@ class MissionsPanel:
         #: The mission and the vehicles whose dry run has passed.
         self._passed: tuple[str, tuple[str, ...]] | None = None
         self._choice = ui.label().classes("choice")
-        self._file = ui.select({}, label="mission or trajectory", on_change=self._forget)
+        self._file = ui.select({}, label="mission or trajectory")
+        self._file.on("update:model-value", self._forget)
         self._file.props("dense outlined options-dense").classes("apart")
         with ui.element("div").classes("tools apart"):
             self._dry_run = ui.button("Dry run", on_click=self._start_dry_run)
@@ -38,7 +39,6 @@ class MissionsPanel:
         ).classes("hint apart")
         WaypointsBar(session, scene_view, self._choose)
         self._result = ui.label().classes("result")
-        self._running = ui.label().classes("hint")
         self.list_files()
         session.on_restore.append(self._restore)
 
@@ -68,7 +68,6 @@ class MissionsPanel:
         passed = self._passed == (self._file.value, names)
         why = why or ("a mission is flying" if scene.missions else "")
         allow(self._fly, why or ("" if passed else "a dry run has to pass first"))
-        self._running.text = " · ".join(scene.missions)
 
     def _forget(self) -> None:
         self._passed = None

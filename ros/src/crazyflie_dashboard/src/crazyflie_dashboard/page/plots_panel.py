@@ -57,6 +57,8 @@ class Line(NamedTuple):
     plot: tuple[str, ...]  #: Key of the plot.
     series: Series
     color: str
+    vehicle: str
+    field: str
 
 
 class PlotsPanel:
@@ -138,14 +140,14 @@ class PlotsPanel:
     def _table(self) -> None:
         """Let the browser keep the numbers that are seen."""
         rows = (
-            f"{name},{line.series.unit},{time:.3f},{value:.9g}\n"
+            f"{line.vehicle},{line.field},{line.series.unit},{time:.3f},{value:.9g}\n"
             for line in self._lines
-            for name in [f"{' '.join(line.plot)} {line.series.name}".strip()]
             for time, value in zip(line.series.times, line.series.values, strict=True)
             if self._window[0] <= time <= self._window[1]
         )
         ui.download.content(
-            'name,unit,"time before what is shown, s",value\n' + "".join(rows), "plots.csv"
+            'vehicle,field,unit,"time before what is shown, s",value\n' + "".join(rows),
+            "plots.csv",
         )
 
     def _draw(self) -> None:
@@ -227,14 +229,12 @@ def lines(
             if (series := own.get(field)) is None:
                 continue
             if len(names) > 1:
-                row = Line((field,), replace(series, name=name), COLORS[k % len(COLORS)])
+                plot, shown, color = (field,), name, COLORS[k % len(COLORS)]
             else:
                 is_own = series.unit == "deg" or "/" in field
                 color = AXES.get(field[-1:] if " " in field or "/" in field else "", "")
-                row = Line(
-                    (series.unit, *([field] if is_own else [])), replace(series, name=field), color
-                )
-            rows.append(row)
+                plot, shown = (series.unit, *([field] if is_own else [])), field
+            rows.append(Line(plot, replace(series, name=shown), color, name, field))
     order = list(dict.fromkeys(row.plot for row in rows))
     rows.sort(key=lambda row: order.index(row.plot))
     return [

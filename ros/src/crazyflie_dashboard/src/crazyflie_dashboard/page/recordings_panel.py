@@ -31,10 +31,11 @@ class RecordingsPanel:
             rows=[],
             row_key="begin",
             selection="multiple",
-        ).props('dense flat wrap-cells no-data-label="No flight has been recorded yet."')
-        self.list_recordings()
+        ).props("dense flat wrap-cells hide-selected-banner")
+        self._table.props('no-data-label="No flight has been recorded yet."')
+        self.list_files()
 
-    def list_recordings(self) -> None:
+    def list_files(self) -> None:
         """Show the recordings that there are now."""
         self._recordings = self._session.dashboard.recordings()
         self._table.rows = [row(each) for each in self._recordings]
@@ -43,7 +44,7 @@ class RecordingsPanel:
         """Follow a recording that ends, and say what the button does."""
         if scene.recording != self._recording:
             self._recording = scene.recording
-            self.list_recordings()
+            self.list_files()
         count = len(self._table.selected)
         noun = "recording" if len(self._recordings) == 1 else "recordings"
         self._count.text = f"{len(self._recordings)} {noun}"
@@ -58,7 +59,7 @@ class RecordingsPanel:
             result = await self._session.succeeds(dashboard.make_report(names))
         self._make.props(remove="loading")
         if result:
-            self.list_recordings()
+            self.list_files()
             self._session.show_report(urlencode([("of", name) for name in names]))
 
 

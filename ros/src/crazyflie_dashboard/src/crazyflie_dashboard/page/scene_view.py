@@ -21,8 +21,8 @@ FOLDER = Path(__file__).parent
 MAX_UNANSWERED = 3
 ANSWER_LIMIT = 2.0  #: Time after which a scene is treated as answered (s).
 PART_TIME = 1e-5  #: Time between two transmissions of solids, for each of them (s).
-#: Colors of vehicles, for plans and plots.
-COLORS = ("#4ea1ff", "#ffb545", "#b58cff", "#5fd3e0", "#f178b6", "#b3d465", "#93a0b2", "#e0c9a6")
+#: Colors of vehicles, for plans and plots; they can be read on a light page and on a dark one.
+COLORS = ("#2f86dd", "#d07c00", "#9a68e8", "#0e9aa7", "#db4f98", "#6d9a1f", "#7b8798", "#a9794a")
 DIGITS = 4  #: Decimal places of positions (m) and quaternions that the browser is sent.
 
 ui.scene  # noqa: B018  Registers three.js.

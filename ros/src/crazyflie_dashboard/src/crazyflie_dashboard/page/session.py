@@ -16,6 +16,7 @@ from crazyflie_utils.refusal import RefusalError
 
 #: Handler in the browser that sends the time of a click; see head.html.
 CLICKED = "(event) => emit(clickTime(event))"
+WARNING = "color=warning text-color=dark"  #: Look of buttons that end something.
 MAX_PLOTTED = 8  #: Largest number of vehicles whose plots are shown.
 REFUSAL_TIME = 12000  #: Time for which a refusal is shown, ms.
 
@@ -103,13 +104,12 @@ class Session:
         """Show a text for a while: "positive", "info", "warning" or "negative"."""
         timeout = REFUSAL_TIME if kind in ("negative", "warning") else 5000
         with self._client:
-            ui.notify(
-                text, type=kind, position="bottom-left", timeout=timeout, close_button="close"
-            )
+            ui.notify(text, type=kind, position="top-left", timeout=timeout, close_button="close")
 
     def show_report(self, query: str = "") -> None:
         """Offer a report; by default that on the last recording."""
-        with self._client, ui.dialog() as dialog, ui.card():
+        # It comes late: the page can be used beside it.
+        with self._client, ui.dialog().props("seamless position=left") as dialog, ui.card():
             ui.label("The report is ready.")
             ui.link("Open the report", f"/report?{query}", new_tab=True).classes("report")
             ui.button("Close", on_click=dialog.close).props("flat")
@@ -184,7 +184,8 @@ class Session:
             with self._client, ui.dialog() as dialog, ui.card():
                 ui.label(f"{str(error)[0].upper()}{str(error)[1:]}.")
                 with ui.row():
-                    ui.button("Take over", color="warning", on_click=lambda: dialog.submit(True))
+                    take = ui.button("Take over", on_click=lambda: dialog.submit(True))
+                    take.props(WARNING)
                     ui.button("Watch only", on_click=lambda: dialog.submit(False)).props("flat")
             if await dialog and self.page:
                 pages.take(self.page, is_confirmed=True)

@@ -59,7 +59,7 @@ def strip(row: Progress, obstacle: str) -> dict[str, Any]:
     is_failed = row.stage in (Stage.REFUSED, Stage.ENDED)
     return {
         "number": row.number,
-        "stage": row.stage.value,
+        "stage": row.word,
         "look": row.stage.name.lower(),
         "text": row.text,
         "detail": row.detail,

@@ -7,7 +7,7 @@ from nicegui.elements.mixins.value_element import ValueElement
 from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.page.session import Session
-from crazyflie_dashboard.progress import Progress, Stage
+from crazyflie_dashboard.progress import Stage
 from crazyflie_dashboard.snapshot import Scene, Step
 
 STEP = 5.0  #: Steps in which the length of the bar grows (s).
@@ -31,7 +31,8 @@ class TimeBar(ValueElement, component="timebar.js"):  # type: ignore[call-arg]
         kept = 0.0 if begin is None else STEP * round((now - begin) / STEP)
         marks = [(each.time, each.level, each.text) for each in dashboard.events()]
         marks += [
-            (row.begun, LEVELS.get(row.stage, "info"), words(row)) for row in dashboard.progress()
+            (row.begun, LEVELS.get(row.stage, "info"), f"{row.text}: {row.outcome}")
+            for row in dashboard.progress()
         ]
         # Rounded: a mark that moves all the time would be sent all the time.
         events = [[STEP * round((now - at) / STEP), level, text] for at, level, text in marks]
@@ -59,8 +60,3 @@ def _bar(
         "recording": recording,
         "steps": [list(step) for step in steps],
     }
-
-
-def words(row: Progress) -> str:
-    """Return a command and what has become of it as one text."""
-    return f"{row.text}: {row.stage.value}{', ' if row.detail else ''}{row.detail}"

@@ -10,7 +10,7 @@ from nicegui.events import GenericEventArguments
 
 from crazyflie_dashboard.actions import HEIGHTS
 from crazyflie_dashboard.page.scene_view import SceneView, condition
-from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.page.session import CLICKED, WARNING, Session, allow
 from crazyflie_dashboard.progress import REACHED
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
@@ -63,14 +63,17 @@ class VehiclesPanel:
             self._height = _number("height, m", 1.0, *HEIGHTS)
             self._add_button("Land", Action.LAND, "icon=flight_land color=primary")
             self._add_button("Hold", Action.HOLD, "icon=pause color=secondary")
-            self._add_button("Reset", Action.RESET, "icon=restart_alt color=warning")
+            self._add_button("Reset", Action.RESET, f"icon=restart_alt {WARNING}")
             self._buttons[Action.RESET].set_visibility(False)
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
             self._yaw = _number("yaw, °")
             self._add_button("Go", Action.GO_TO, "icon=near_me color=accent")
+        self._obstacles: dict[Action, str] = {}  # Why the selected vehicles cannot be commanded.
         for field in (*self._goal, self._yaw):
             field.on_value_change(self._draw_goal)
+        for field in (self._height, *self._goal):
+            field.on_value_change(self._allow)
         self._limits = ui.label().classes("hint limits")
         ui.label(
             "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles "
@@ -97,8 +100,8 @@ class VehiclesPanel:
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} selected"
         chosen = [scene.vehicles[name] for name in names if name in scene.vehicles]
         obstacle = self._session.obstacle
-        for action, button in self._buttons.items():
-            allow(button, obstacle or why_not(action, chosen))
+        self._obstacles = {each: obstacle or why_not(each, chosen) for each in self._buttons}
+        self._allow()
         self._buttons[Action.RESET].set_visibility(any(each.is_emergency for each in chosen))
         self._hide_goal_that_is_reached(chosen)
         self._limits.text = limits_text(self._session.dashboard.limits(names))
@@ -112,6 +115,24 @@ class VehiclesPanel:
             card(each, each.name in names, obstacle, left.get(each.name, ""))
             for each in scene.vehicles.values()
         ]
+
+    def _allow(self) -> None:
+        """Enable the buttons of what can be done now by what is in the fields."""
+        for action, button in self._buttons.items():
+            allow(button, self._obstacles.get(action, "") or self._missing(action))
+
+    def _missing(self, action: Action) -> str:
+        """Return what an action still needs, or ""."""
+        if action is Action.TAKEOFF and self._height.value is None:
+            return "type a height"
+        if action is Action.GO_TO and None in self._typed:
+            return "click on the floor, or type x, y and z"
+        return ""
+
+    @property
+    def _typed(self) -> tuple[float | None, ...]:
+        """The goal in the fields (m)."""
+        return tuple(field.value for field in self._goal)
 
     def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])
@@ -127,17 +148,15 @@ class VehiclesPanel:
 
     async def _command(self, action: Action, names: Sequence[str], clicked: float) -> None:
         """Command vehicles by what is in the fields."""
+        # The buttons of cards are not grey then.
+        if missing := self._missing(action):
+            self._session.say(f"{action.value}: {missing}", "warning")
+            return
         details: dict[str, Any] = {}
-        goal = tuple(field.value for field in self._goal)
+        goal = self._typed
         if action is Action.TAKEOFF:
-            if self._height.value is None:
-                self._session.say("take off: type a height", "warning")
-                return
             details = {"height": self._height.value}
         elif action is Action.GO_TO:
-            if None in goal:
-                self._session.say("go to: click on the floor, or type x, y and z", "warning")
-                return
             yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
             details = {"goal": goal, "yaw": yaw}
         elif action is Action.HOLD:
@@ -156,7 +175,7 @@ class VehiclesPanel:
 
     def nudge(self, key: str) -> None:
         """Move the goal, if there is one, by a key."""
-        if key not in NUDGES or any(field.value is None for field in self._goal):
+        if key not in NUDGES or None in self._typed:
             return
         axis, step = NUDGES[key]
         self._goal[axis].value = round(self._goal[axis].value + step, 2)
@@ -167,8 +186,8 @@ class VehiclesPanel:
             field.value = None
 
     def _draw_goal(self) -> None:
-        x, y, z = (field.value for field in self._goal)
-        is_set = None not in (x, y, z)
+        x, y, z = self._typed
+        is_set = None not in self._typed
         yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
         self._scene_view.show_goal({"x": x, "y": y, "z": z, "yaw": yaw} if is_set else None)
 
@@ -179,9 +198,10 @@ class VehiclesPanel:
             return
         middle = [sum(place[k] for place in places) / len(places) for k in range(3)]
         if math.dist(middle, self._sent) < REACHED:
-            self._sent = None
-            for field in self._goal[:2]:
+            # One that was set meanwhile stays.
+            for field in self._goal[:2] if self._typed == self._sent else ():
                 field.value = None
+            self._sent = None
 
 
 def limits_text(limits: tuple[Box, str] | None) -> str:

@@ -19,7 +19,7 @@ from crazyflie_dashboard.page.parameters_panel import ParametersPanel
 from crazyflie_dashboard.page.plots_panel import PlotsPanel
 from crazyflie_dashboard.page.recordings_panel import RecordingsPanel
 from crazyflie_dashboard.page.scene_view import SceneView
-from crazyflie_dashboard.page.session import CLICKED, Session, allow
+from crazyflie_dashboard.page.session import CLICKED, WARNING, Session, allow
 from crazyflie_dashboard.page.strips import Strips
 from crazyflie_dashboard.page.timebar import TimeBar
 from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
@@ -74,7 +74,7 @@ class View:
         ui.label("Mission control").classes("title")
         self._summary = ui.label().classes("summary")
         ui.element("div").classes("space")
-        self._stop = ui.button("Stop mission").props("unelevated color=warning icon=stop")
+        self._stop = ui.button("Stop mission").props(f"unelevated {WARNING} icon=stop")
         self._stop.classes("sign").on("click", self._stop_mission, js_handler=CLICKED)
         self._record = ui.button("Record", on_click=self._turn_recording)
         self._record.props("flat dense icon=fiber_manual_record").classes("sign")
@@ -125,9 +125,14 @@ class View:
             for name, build in builders.items():
                 with ui.tab_panel(name):
                     self._panels[name] = build(self._session)
+        tabs.on_value_change(self._list)
         tabs.on_value_change(self._refresh)
         tabs.on_value_change(lambda event: self._session.keep(tab=event.value))
         self._session.on_restore.append(lambda kept: tabs.set_value(kept.get("tab", tabs.value)))
+
+    def _list(self) -> None:
+        """Let a panel that is shown look for new files."""
+        getattr(self._panels[self._tabs.value], "list_files", lambda: None)()
 
     def _clear(self) -> None:
         self._dashboard.forget_paths(self._session.page)

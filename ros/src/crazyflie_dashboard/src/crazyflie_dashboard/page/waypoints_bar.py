@@ -59,6 +59,7 @@ class WaypointsBar:
         why = "" if points else "no waypoint is set"
         for button in (self._clear, self._save):
             allow(button, why)
+        allow(self._undo, "" if self._waypoints.can_undo else "no waypoint was changed")
 
     async def _keep(self) -> None:
         future = self._session.dashboard.save_waypoints(

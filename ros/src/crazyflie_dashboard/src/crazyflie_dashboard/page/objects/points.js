@@ -3,7 +3,7 @@
 import { THREE } from "nicegui-scene";
 import { label } from "./vehicles.js";
 
-const COLOR = "#f178b6", NEAR = 0.08;  // Of a click on a line, m.
+const COLOR = "#db4f98", NEAR = 0.08;  // Of a click on a line, m.
 
 const line = (points) => new THREE.Line(new THREE.BufferGeometry().setFromPoints(points),
   new THREE.LineBasicMaterial({ color: COLOR }));

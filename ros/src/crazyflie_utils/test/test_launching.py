@@ -1,7 +1,11 @@
 """Errors of a launch are reported."""
 
-import pytest
+import contextlib
 
+import pytest
+import rosgraph
+
+from crazyflie_utils.testing import launching
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 
@@ -54,3 +58,20 @@ def test_a_launch_file_that_cannot_be_read_is_named(tmp_path):
     for file in ("top.launch", "none.launch"):
         with pytest.raises(LaunchError, match=file), roslaunch([str(tmp_path / file)], tmp_path):
             pass
+
+
+def test_the_end_of_a_launch_is_waited_for_in_words(tmp_path, monkeypatch):
+    shown = []
+
+    @contextlib.contextmanager
+    def waiting(text):
+        before = rosgraph.is_master_online()
+        yield
+        shown.append((text, before, rosgraph.is_master_online()))
+
+    monkeypatch.setattr(launching, "waiting", waiting)
+    for name in ("ROS_MASTER_URI", "ROS_IP"):
+        monkeypatch.setenv(name, "")  # Set by it, and put back after the test.
+    with launching.master(tmp_path / "log"):
+        pass
+    assert shown[1:] == [("ending what was launched", True, False)]

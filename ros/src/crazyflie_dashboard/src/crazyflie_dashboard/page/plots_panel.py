@@ -229,7 +229,8 @@ def lines(
             if (series := own.get(field)) is None:
                 continue
             if len(names) > 1:
-                plot, shown, color = (field,), name, COLORS[k % len(COLORS)]
+                plot: tuple[str, ...] = (field,)
+                shown, color = name, COLORS[k % len(COLORS)]
             else:
                 is_own = series.unit == "deg" or "/" in field
                 color = AXES.get(field[-1:] if " " in field or "/" in field else "", "")

@@ -153,19 +153,18 @@ class VehiclesPanel:
             self._session.say(f"{action.value}: {missing}", "warning")
             return
         details: dict[str, Any] = {}
-        goal = self._typed
         if action is Action.TAKEOFF:
             details = {"height": self._height.value}
         elif action is Action.GO_TO:
             yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
-            details = {"goal": goal, "yaw": yaw}
+            details = {"goal": self._typed, "yaw": yaw}
         elif action is Action.HOLD:
             self._sent = None
         elif action is Action.RESET:
             vehicles = self._session.vehicles
             names = [name for name in names if vehicles[name].is_emergency]
         if await self._session.command(action, names, clicked, **details) and "goal" in details:
-            self._sent = goal
+            self._sent = details["goal"]
 
     def _set_goal(self, event: GenericEventArguments) -> None:
         x, y, z = self._goal

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_utils.refusal import by_reason, distinct
+from crazyflie_utils.refusal import by_reason, distinct, listed
 
 
 def test_reasons_that_differ_in_numbers_are_one():
@@ -27,3 +27,9 @@ def test_numbers_that_differ_are_told_apart(value, limit, texts):
     assert distinct(value, limit) == texts
     assert distinct(0.278, 0.33, "g", 3) == ("0.278", "0.33")
     assert distinct(0.32996, 0.33, "g", 3) == ("0.32996", "0.33")
+
+
+def test_of_many_names_only_their_number_is_said():
+    assert listed(["cf1", "cf2"]) == "cf1, cf2"
+    names = [f"cf{k}" for k in range(100)]
+    assert (listed(names), listed(names, "nodes")) == ("100 vehicles", "100 nodes")

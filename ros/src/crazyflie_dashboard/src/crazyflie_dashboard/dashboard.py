@@ -24,7 +24,6 @@ from crazyflie_dashboard.page_data import (
     Outcomes,
     ParameterInfo,
     Series,
-    listed,
     words,
 )
 from crazyflie_dashboard.page_state import PageState
@@ -34,7 +33,7 @@ from crazyflie_dashboard.recording import Recorded, Recording
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_takeoff.envelope import Box
 from crazyflie_utils import NodeHandle, ServiceError
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.refusal import RefusalError, listed
 from crazyflie_utils.steps import follow
 
 _COMPARE_PERIOD = 0.2  #: Period in which commands are compared with what vehicles do (s).

@@ -20,7 +20,6 @@ from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.history import History
 from crazyflie_dashboard.master import Master
 from crazyflie_dashboard.messages import Diagnostics, log_line
-from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.snapshot import (
     STALE_AGE,
@@ -36,6 +35,7 @@ from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
 from crazyflie_takeoff.envelope import Box
 from crazyflie_utils import NodeHandle
+from crazyflie_utils.refusal import listed
 from crazyflie_utils.tf.frame_tree import RawTransforms, StampedPose
 from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED
 

@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.snapshot import Scene, VehicleSnapshot
+from crazyflie_utils.refusal import listed
 
 SPAN = 600.0  #: Time that is kept (s).
 _PERIOD = 0.2  #: Shortest time between two scenes that are kept (s).

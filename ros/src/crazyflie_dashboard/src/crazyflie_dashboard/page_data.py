@@ -1,15 +1,14 @@
 """Requests of pages and their answers, as plain data and in words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
 from crazyflie_dashboard.snapshot import Action, Triple
-from crazyflie_utils.refusal import by_reason
+from crazyflie_utils.refusal import by_reason, listed
 from crazyflie_utils.steps import Steps
 
-_MAX_NAMES = 8  #: Largest number of vehicle names in one text.
 #: Largest age of a command (s): an older one was delayed in a browser or a network, and is not
 #: carried out.
 MAX_COMMAND_AGE = 1.0
@@ -107,8 +106,3 @@ def gathered(answers: "Mapping[str, Future[Any]]") -> Steps[Outcomes]:
 def summary(outcomes: Outcomes) -> list[str]:
     """Return the refusals, each text once with its vehicles."""
     return by_reason({name: text for name, text in outcomes.items() if text}, listed)
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as a text; for many vehicles only their number."""
-    return ", ".join(names) if len(names) <= _MAX_NAMES else f"{len(names)} vehicles"

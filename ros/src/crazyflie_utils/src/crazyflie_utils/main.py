@@ -24,6 +24,7 @@ from crazyflie_utils.parameters.declaration import ParameterError, Parameters, p
 from crazyflie_utils.parameters.server import leaves
 from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Converted
 from crazyflie_utils.program import load, missing_module
+from crazyflie_utils.refusal import listed
 from crazyflie_utils.ros1.master_watch import MasterWatch, bounded_master, namesake
 from crazyflie_utils.ros1.transport import RosTransport
 
@@ -409,7 +410,7 @@ class Shutdown:
                 if names := own or flights.unattended(2.0 * _NOTICE_DELAY):
                     self._process.transport.log(
                         "warn",
-                        f"{', '.join(names)}: in flight; ends after the landing, or in "
+                        f"{listed(names, 'nodes')}: in flight; ends after the landing, or in "
                         f"{_FLIGHT_LIMIT:g} s; another signal ends at once",
                     )
             if len(self._signals) > signals:

@@ -2,7 +2,9 @@
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+
+_MAX_NAMES = 8  #: Largest number of names in one text.
 
 
 class RefusalError(Exception):
@@ -25,6 +27,11 @@ def distinct(value: float, limit: float, form: str = "f", digits: int = 2) -> tu
     if shown == least and value != limit and digits < 9:
         return distinct(value, limit, form, digits + 1)
     return shown, least
+
+
+def listed(names: Sequence[str], what: str = "vehicles") -> str:
+    """Return names as a text; of many only their number and what they are."""
+    return ", ".join(names) if len(names) <= _MAX_NAMES else f"{len(names)} {what}"
 
 
 def by_reason(refusals: Mapping[str, str], listed: Callable[..., str] = ", ".join) -> list[str]:

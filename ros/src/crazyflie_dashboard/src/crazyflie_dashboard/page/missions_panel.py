@@ -11,9 +11,8 @@ from nicegui.events import GenericEventArguments
 from crazyflie_dashboard.page.scene_view import SceneView
 from crazyflie_dashboard.page.session import CLICKED, Session, allow
 from crazyflie_dashboard.page.waypoints_bar import WaypointsBar
-from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.snapshot import Scene
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.refusal import RefusalError, listed
 
 
 class MissionsPanel:

@@ -5,9 +5,9 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from crazyflie_dashboard.page.session import Session, allow
-from crazyflie_dashboard.page_data import listed
 from crazyflie_dashboard.recording import Recorded
 from crazyflie_dashboard.snapshot import Scene
+from crazyflie_utils.refusal import listed
 
 COLUMNS = ("begin", "length", "size", "vehicles", "report")
 

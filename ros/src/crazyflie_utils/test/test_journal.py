@@ -2,6 +2,7 @@
 
 import errno
 import json
+import sys
 import threading
 from concurrent.futures import Future
 
@@ -474,11 +475,21 @@ def test_a_number_of_another_size_is_damage(path, kind, is_ended):
     assert journal.damage == "a row is damaged"
 
 
-@pytest.mark.parametrize("program", ["os:abort", "subprocess:run", "no_such_module:Node", "os"])
+@pytest.mark.parametrize(
+    "program",
+    [
+        *("os:abort", "subprocess:run", "no_such_module:Node", "os"),
+        # These act when they are imported: on the browser, and the terminal.
+        *("antigravity:geohash", "this:s", "unittest.__main__:main"),
+    ],
+)
 def test_only_nodes_are_made(path, program):
+    module = program.partition(":")[0]
+    was_loaded = module in sys.modules
     JournalWriter(path, {**HEADER, "clock": "steady", "program": program}, 1.0, print).close()
     with pytest.raises(JournalError, match=program), Replay(Journal(path)) as replay:
         run(replay)
+    assert (module in sys.modules) is was_loaded
 
 
 @pytest.mark.parametrize(
@@ -488,6 +499,10 @@ def test_only_nodes_are_made(path, program):
         (b"#ROSBAG V2.0\n", "is not a journal"),
         (b'{"format": "crazyflie journal 99"}\n', "crazyflie journal 99"),
         (b'{"format": "crazyflie journal 3", "node": 3}\n', "node is 3; expected str"),
+        (
+            json.dumps({"format": journal_file.FORMAT, **HEADER, "clock": "odd"}).encode() + b"\n",
+            "clock is 'odd'; expected steady, simulated or manual",
+        ),
     ],
 )
 def test_what_is_no_journal_is_named(path, content, reason):

@@ -22,7 +22,7 @@ from crazyflie_reports.flown_model import FlownModel
 from crazyflie_utils.node import Node
 from crazyflie_utils.offline_process import OfflineProcess
 from crazyflie_utils.offline_transport import OfflineTransport
-from crazyflie_utils.program import load, missing_module
+from crazyflie_utils.program import load_recorded, missing_module
 
 TF, _ROSOUT = "/tf", "/rosout"
 _LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warn": Log.WARN, "error": Log.ERROR}
@@ -80,7 +80,7 @@ def _make(name, path):
 
 def _class(name, path):
     try:
-        made = load(path)
+        made = load_recorded(path)
         if isinstance(made, type) and issubclass(made, Node):
             return made
         reason = "it is not a class derived from Node"

@@ -1,7 +1,9 @@
 """Starts programs by name, and names the package of a Python module that is missing."""
 
 import importlib
+import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -54,6 +56,21 @@ def load(path: str) -> Any:
     """Import and return the object named as "package.module:name"."""
     module, _, name = path.partition(":")
     return getattr(importlib.import_module(module), name)
+
+
+def load_recorded(path: str) -> Any:
+    """Do the same for a name in a file, which anybody may have written.
+
+    Importing a module may do anything: `ImportError` for one that is neither loaded nor in a
+    folder of PYTHONPATH, as all packages of workspaces are.
+    """
+    module = path.partition(":")[0]
+    spec = None if module in sys.modules else find_spec(module.partition(".")[0])
+    if spec is not None:
+        folders = [Path(each) for each in os.environ.get("PYTHONPATH", "").split(":") if each]
+        if not any(folder in Path(spec.origin or "").parents for folder in folders):
+            raise ImportError(f"{module:.80} is in no folder of PYTHONPATH; it is not imported")
+    return load(path)
 
 
 def run_program(path: str) -> NoReturn:

@@ -36,6 +36,7 @@ FORMAT = "crazyflie journal 3"  #: The first field of the header; another format
 #: the nodes; "steady", "simulated" or "manual"; the machine's clock at the beginning, us; time of a
 #: manual clock at the beginning, s.
 _HEADER = {"node": str, "program": str, "clock": str, "us": int, "start": float}
+_CLOCKS = ("steady", "simulated", "manual")
 SUFFIX = ".journal"  #: Of a journal's file.
 
 CHUNK = struct.Struct("<4sIIII")  #: Mark, number, bytes compressed and not, CRC of the compressed.
@@ -374,8 +375,13 @@ class Journal:
         for name, kind in _HEADER.items():
             if not isinstance(self.header.get(name), kind):
                 raise JournalError(
-                    f"{path}: {name} is {self.header.get(name)!r}; expected {kind.__name__}"
+                    f"{path}: {name} is {self.header.get(name)!r:.80}; expected {kind.__name__}"
                 )
+        if self.header["clock"] not in _CLOCKS:
+            raise JournalError(
+                f"{path}: clock is {self.header['clock']!r:.80}; expected {_CLOCKS[0]}, "
+                f"{_CLOCKS[1]} or {_CLOCKS[2]}"
+            )
 
     def rows(self) -> Iterator[Row]:
         """Yield all rows in order; `damage` says whether there may have been more."""
@@ -387,9 +393,9 @@ class Journal:
             if number != expected:
                 # What is left cannot follow from what was before.
                 self.damage = (
-                    f"chunks {expected} to {number - 1} are not in it: older ones were dropped "
-                    "(it keeps CRAZYFLIE_JOURNAL_MINUTES), or the file was changed; in which state "
-                    "the nodes were after them is not known"
+                    f"chunk {expected} is not in its place, but {number} is: older ones were "
+                    "dropped (it keeps CRAZYFLIE_JOURNAL_MINUTES), or the file was changed; in "
+                    "which state the nodes were then is not known"
                 )
                 return
             expected = number + 1
@@ -463,6 +469,8 @@ def _with_checks(rows: Iterable[Row]) -> Iterator[Row]:
             continue
         checks = iter(row.data)
         for each in waiting:
-            is_message = each.kind is Kind.PUBLISHED
-            yield each._replace(value=next(checks, UNCHECKED)) if is_message else each
+            if each.kind is Kind.PUBLISHED:
+                yield Row(Kind.PUBLISHED, each.number, next(checks, UNCHECKED), each.data)
+            else:
+                yield each
         waiting.clear()

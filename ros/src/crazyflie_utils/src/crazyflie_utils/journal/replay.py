@@ -31,7 +31,7 @@ from crazyflie_utils.journal.replay_transport import (
 )
 from crazyflie_utils.node import Node, Process, initialization_failure
 from crazyflie_utils.offline_process import OfflineProcess
-from crazyflie_utils.program import load
+from crazyflie_utils.program import load_recorded
 from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.tasks import Tasks
 from crazyflie_utils.timers import Executor, SteadyClock
@@ -370,17 +370,18 @@ class Replay:
                 f"{self.journal.path}: the nodes of {self.journal.header['node']} were made by a "
                 "function without a name; they cannot be made again"
             )
+        shown = f"{path:.200}"
         try:
-            make = load(path)
+            make = load_recorded(path)
         except (ImportError, AttributeError, ValueError) as error:
             raise JournalError(
-                f"{self.journal.path}: there is no {path} any more: {error}"
+                f"{self.journal.path}: there is no {shown} any more: {error!s:.400}"
             ) from None
         hints = getattr(make, "__annotations__", {})
         if (isinstance(make, type) and issubclass(make, Node)) or NodeHandle in hints.values():
             return make
         raise JournalError(
-            f"{self.journal.path}: {path} is no node; expected a class derived from Node, or a "
+            f"{self.journal.path}: {shown} is no node; expected a class derived from Node, or a "
             "function of a NodeHandle"
         )
 

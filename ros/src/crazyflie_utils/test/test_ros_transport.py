@@ -20,7 +20,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from crazyflie_utils import ServiceError
 from crazyflie_utils.ros1 import calls, patches
 from crazyflie_utils.ros1.calls import wait_for_answer
-from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
+from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription, PeerChanges
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.testing.programs import wait_until
 
@@ -124,6 +124,17 @@ def test_a_topic_without_connections_is_not_polled(topic):
     topic.connections = [None]
     topic.check()
     assert polls == [topic]
+
+
+def test_connections_that_come_and_go_are_counted():
+    """With a journal, nodes are told of others' subscribers when that has changed."""
+    topic = OwnSubscription("/a", String, lambda: True, ignore, False, frozenset())
+    connection = TCPROSTransport(TCPROSSub("/a", String), "/a")
+    before = PeerChanges.count
+    topic.add_connection(connection)
+    added = PeerChanges.count
+    connection.close()
+    assert before < added < PeerChanges.count
 
 
 def test_connections_that_come_at_once_are_not_put_off(monkeypatch):

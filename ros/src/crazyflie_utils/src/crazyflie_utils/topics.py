@@ -133,6 +133,10 @@ class Transport(ABC):
         messages may be held back until `collect` is called.
         """
 
+    def peer_changes(self) -> int | None:
+        """Return a number that changes when a subscriber or publisher comes or goes, if known."""
+        return None
+
     def collect(self) -> None:  # noqa: B027 - Nothing waits in most transports.
         """Deliver the messages that wait, of all topics; not in a callback."""
 

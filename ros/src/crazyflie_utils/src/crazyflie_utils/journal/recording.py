@@ -44,7 +44,8 @@ from crazyflie_utils.topics import (
 
 _U64, _I64, _MOMENT = struct.Struct("<Q"), struct.Struct("<q"), struct.Struct("<d")
 _LONGEST = 0xFFFFFFFF  #: Longest time between two inputs that is written (us).
-_LOOK_PERIOD = 10_000  #: Period of such looks at inputs (us).
+_LOOK_PERIOD = 100_000  #: Period of looks at what is to be written, at inputs (us).
+_FLAGS_PERIOD = 1_000_000  #: Longest time between two looks at all flags (us).
 NO_ERRORS: Mapping[str, type[Exception]] = MappingProxyType({})
 _CHECKED_TOGETHER = 64  #: Number of messages that are checked together.
 
@@ -154,8 +155,10 @@ class Recorder:
         self.clock: RecordedClock
         #: Returns wall clock minus the process's clock (ns).
         self.wall: Callable[[], int] = lambda: 0
-        self.look_period = _LOOK_PERIOD  #: Time between two looks at what is to be written (us).
+        self.look_period = _LOOK_PERIOD  #: Time between two looks (us).
         self._next_look = self._next_flags = 0  # (us).
+        self._peer_changes: Callable[[], int | None]
+        self._seen_changes: int | None = None
         self.is_collecting = False  #: Whether messages are collected for the next turn.
         self.flags: dict[int, _Flag] = {}  #: Of all topics, by their numbers.
         self._last = int(writer.header["us"])
@@ -166,7 +169,7 @@ class Recorder:
 
     def attach(self, transport: Transport, executor: Executor) -> Any:
         """Begin to record; return the transport that the process is to use."""
-        self.executor = executor
+        self.executor, self._peer_changes = executor, transport.peer_changes
         self.clock = RecordedClock(self, executor)
         self.wall = self.clock.measure_offset
         executor.before_timers = partial(self.input, _TIMERS)
@@ -190,8 +193,10 @@ class Recorder:
     def _look(self, now):
         """Look at what is written now and then; ``now`` is in us."""
         self._next_look = now + self.look_period
-        if now >= self._next_flags:
-            self._next_flags = now + 10 * self.look_period
+        changes = self._peer_changes()
+        # Each flag is at another place of the memory, which takes longer than all else.
+        if changes is None or changes != self._seen_changes or now >= self._next_flags:
+            self._seen_changes, self._next_flags = changes, now + _FLAGS_PERIOD
             self._look_at_flags()
         if len(self._unchecked) >= _CHECKED_TOGETHER or not self.look_period:
             self._check()

@@ -119,7 +119,37 @@ class OwnCallback:
             self._deliver(message)
 
 
-class OwnSubscription(rospy.topics._SubscriberImpl):
+class PeerChanges:
+    """How often a connection of these topics has come or gone in this process."""
+
+    count = 0
+
+
+class _Counted(rospy.topics._TopicImpl):
+    """Counts its changes, and asks the system for none if there are no connections."""
+
+    @override
+    def check(self) -> None:
+        # A system call for each topic, twice a second and at each update of the master's.
+        before = self.connections
+        if before:
+            super().check()
+            if self.connections is not before:
+                PeerChanges.count += 1
+
+    @override
+    def add_connection(self, c: Any) -> bool:
+        is_added = super().add_connection(c)
+        PeerChanges.count += 1
+        return bool(is_added)
+
+    @override
+    def remove_connection(self, c: Any) -> None:
+        super().remove_connection(c)
+        PeerChanges.count += 1
+
+
+class OwnSubscription(_Counted, rospy.topics._SubscriberImpl):
     """rospy's side of a topic, by remapped name, that handles subscribe to, with these patches.
 
     See `OwnCallback` and `receiving.Reception`.
@@ -142,12 +172,6 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
         self._report = report
         self._limits_rate = limits_rate
         self._patches = patches
-
-    @override
-    def check(self) -> None:
-        # A system call for each topic, twice a second and at each update of the master's.
-        if self.connections:
-            super().check()
 
     def _is_own(self):
         """Return whether only handles have subscribed."""
@@ -185,7 +209,7 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
             return super().add_connection(c)
 
 
-class OwnPublication(rospy.topics._PublisherImpl):
+class OwnPublication(_Counted, rospy.topics._PublisherImpl):
     """rospy's side of a topic that handles publish."""
 
     def __init__(self, name: str, message_type: type, queue_size: int, latch: bool):
@@ -194,11 +218,6 @@ class OwnPublication(rospy.topics._PublisherImpl):
         # Set before the registration, since subscribers connect at once.
         self._limit = queue_size
         self.is_latch = latch
-
-    @override
-    def check(self) -> None:
-        if self.connections:
-            super().check()
 
     @override
     def set_queue_size(self, queue_size: int) -> None:

@@ -28,7 +28,7 @@ from crazyflie_utils.ros1.calls import (
     withdrawn,
 )
 from crazyflie_utils.ros1.master_watch import living_node
-from crazyflie_utils.ros1.own_topics import OwnCallback, OwnPublication
+from crazyflie_utils.ros1.own_topics import OwnCallback, OwnPublication, PeerChanges
 from crazyflie_utils.ros1.patches import log_without_master, shield_screen_log
 from crazyflie_utils.ros1.receiving import collect_waiting
 from crazyflie_utils.topics import (
@@ -193,6 +193,10 @@ class RosTransport(Transport):
             return rospy.Subscriber(name, message_type, callback, tcp_nodelay=True)
 
         return _RosSubscriber(register, self._run)
+
+    def peer_changes(self) -> int:
+        """Count those of the topics of this process."""
+        return PeerChanges.count
 
     def collect(self) -> None:
         """Read the sockets in which messages wait."""

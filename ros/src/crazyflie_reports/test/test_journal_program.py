@@ -41,7 +41,7 @@ def path(tmp_path):
     graph = FakeGraph({"/echo/gain": 3.0}, recorder=lambda name, time: Recorder(writer))
     graph.start("/echo", EchoNode())
     for k in range(3):
-        graph.publish("/number", Float64(k), caller="/lab")
+        graph.publish("/number", Float64(k), caller=("/lab", "/lab", "/stranger")[k])
         graph.advance(0.1)
     graph.advance(2.0)
     writer.row(Kind.SUBMITTED, 0, 0, b'["/echo", "LogTopics.publish", "(1,)"]')
@@ -66,10 +66,13 @@ def test_what_a_journal_has_is_printed(path, capsys):
         assert line in text
 
 
-def test_messages_of_a_topic_are_printed_with_times(path, capsys):
+def test_messages_of_a_topic_are_printed_with_times_and_senders(path, capsys):
     assert main([str(path), "--topic", "/number"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines == [f"{0.1 * k:.6f} s: data: {float(k)}" for k in range(3)]
+    assert capsys.readouterr().out.splitlines() == [
+        "0.000000 s /lab: data: 0.0",
+        "0.100000 s /lab: data: 1.0",
+        "0.200000 s /stranger: data: 2.0",
+    ]
 
 
 @pytest.mark.parametrize(

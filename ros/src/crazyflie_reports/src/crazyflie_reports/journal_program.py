@@ -47,8 +47,7 @@ class Contents:
     def _count(self, row):
         if row.kind is Kind.MESSAGE:
             self.counts[Kind.SUBSCRIBED, row.number] += 1
-            header = self.names.connection(received(row)[0]) or {}
-            self.callers[row.number].add(header.get("callerid") or "?")
+            self.callers[row.number].add(self.sender(row))
         elif row.kind is Kind.PUBLISHED:
             self.counts[Kind.ADVERTISED, row.number] += 1
         elif row.kind is Kind.CALL:
@@ -66,6 +65,11 @@ class Contents:
             # The first value is that of the start.
             if is_value and what.startswith("/"):
                 self.parameters.setdefault(what, rest[0])
+
+    def sender(self, row: Row) -> str:
+        """Return the node that has sent a message."""
+        header = self.names.connection(received(row)[0]) or {}
+        return header.get("callerid") or "?"
 
     def name(self, kind: Kind, number: int) -> list[str]:
         """Return name and type of a topic or service."""
@@ -140,7 +144,7 @@ def print_messages(contents: Contents, topic: str) -> int:
         if message_type is not None:
             count += 1
             text = _line(message_type().deserialize(received(row)[2]))
-            print(f"{contents.time:.6f} s: {text}")
+            print(f"{contents.time:.6f} s {contents.sender(row)}: {text}")
     return count
 
 

@@ -59,9 +59,8 @@ def test_without_the_fence_they_leave(settings):
 
 
 def test_a_controller_of_ones_own_is_flown(tmp_path, small, capsys):
-    (tmp_path / "mine.py").write_text(
-        "def control(t, p, v, a, walls):\n    return 50.0 + 0.0 * p\n"
-    )
+    # Of more than A, the adversary may take a part.
+    (tmp_path / "mine.py").write_text("def control(t, p, v, a, walls):\n    return 1.4 + 0.0 * p\n")
     text = "model: cf21\nflights: 500\nduration: 3.0\ncontroller: mine.py:control\n"
     settings = certify.read_settings(_write(tmp_path, text))
     farthest = certify.outside(certify.drawn(settings, 0, 50, 1.0))

@@ -13,10 +13,11 @@ from crazyflie_geofence.geofence import Geofence, max_horizontal_braking, max_ve
 from crazyflie_geofence.viable_set import response
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.quadrotor import TYPES
 from crazyflie_model.units import GRAVITY
 
 LOWER, UPPER = (-1.5, -1.0, 0.3), (1.5, 1.2, 2.5)
-AXES = bounds.axes(bounds.load("cf21"), 1.4, 2.0, 0.01, 0.01)
+AXES = bounds.axes(bounds.load("cf21"), 1.4, 2.0)
 MIDDLE = (0.0, 0.1, 1.4)
 AT_REST = (0.0, 0.0, 0.0)
 HOVER = (0.0, 0.0, 0.3, GRAVITY)
@@ -117,6 +118,14 @@ def test_what_the_limits_leave_is_counted_together():
     assert max_vertical_braking(14.0) == pytest.approx(up)
 
 
+@pytest.mark.parametrize("name", TYPES)
+def test_a_type_has_the_thrust_to_brake_with_that_a_loaded_battery_leaves(name):
+    most = bounds.max_thrust(name)
+    assert max_vertical_braking(most) > 2.0
+    rotors = GRAVITY * (TYPES[name].max_rotor_speed / TYPES[name].hover_speed) ** 2
+    assert most < 0.83 * rotors
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_vehicle_outside_comes_back_slowly_and_stays(axis, side):
@@ -214,7 +223,7 @@ class Flight:
         control = self.pending.pop(0)
         self.controls.append(control)
         u = np.array(coupled_acceleration(control, self.yaw))
-        sure = [axis.certain for axis in self.axes]
+        sure = [axis.braking for axis in self.axes]
         certain = np.clip(u, np.negative(sure), sure)
         # Of what is not certain, all is there, or nothing.
         u = certain + (1.0 + self.draw()) / 2.0 * (u - certain)

@@ -13,7 +13,7 @@ from crazyflie_identification.residual import velocity_error
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback, limited
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.dynamics import coupled_acceleration
-from crazyflie_model.limits import MIN_THRUST
+from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
 from crazyflie_model.quadrotor import TYPES
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.vehicle import MotionCapture, SimulatedVehicle
@@ -91,7 +91,7 @@ class FencedFlight:
         """Return e_v along x, y or z (k), m/s, beside the disturbance of an axis."""
         largest = 0.0
         for sign in (1.0, -1.0):
-            towards = np.maximum(sign * self.commanded[:, k], -axis.certain)
+            towards = np.maximum(sign * self.commanded[:, k], -axis.braking)
             gains = gained(towards, axis.tau, axis.delay)
             true, measured = self.velocities[:, k], self.measured_velocities[:, k]
             error = velocity_error(
@@ -207,7 +207,7 @@ def fly(
         changed = control != regular
         needed = changed and is_needed(fence, t, p, v, regular, yaw, commanded)
         roll, pitch, yaw_dot, thrust = control
-        thrust = min(max(thrust, MIN_THRUST), bounds.max_thrust(name))
+        thrust = min(max(thrust, MIN_THRUST), model.max_thrust, MAX_THRUST)
         fence.sent(t, control, yaw)
         response.command((roll, pitch, yaw_dot, thrust), t)
         commanded = tuple(coupled_acceleration((roll, pitch, yaw_dot, thrust), yaw))

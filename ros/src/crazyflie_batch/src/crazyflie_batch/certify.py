@@ -74,7 +74,7 @@ class CertifyParameters(Parameters):
         """Bounds along x and z; `ParameterError` if the model does not have all of them."""
         known = bounds.complete(Bounds(), self.model)
         braking = self.horizontal_braking, self.vertical_braking
-        x, _, z = bounds.axes(known, *braking, 0.01, 0.01)
+        x, _, z = bounds.axes(known, *braking)
         return x, z
 
 

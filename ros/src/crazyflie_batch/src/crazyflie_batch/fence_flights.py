@@ -40,9 +40,10 @@ class Case:
 
 
 def rounded(axis: Axis) -> Axis:
-    """Return bounds whose delay and spread are whole numbers of substeps, the spread a period."""
+    """Return bounds whose delay and spread are whole numbers of substeps."""
     substep = axis.period / SUBSTEPS
-    return replace(axis, delay=round(axis.delay / substep) * substep, spread=axis.period)
+    delay, spread = (round(time / substep) * substep for time in (axis.delay, axis.spread))
+    return replace(axis, delay=delay, spread=spread)
 
 
 class Adversary:
@@ -115,8 +116,8 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
         shown = p + e_p * axis.position_error, v + e_v * axis.velocity_error
         up, down = (*shown, most), (*shown, least)
         for u in queue[:delayed]:
-            up = _moved(step, *up, np.maximum(u, -axis.certain), 0.0)
-            down = _moved(step, *down, np.minimum(u, axis.certain), 0.0)
+            up = _moved(step, *up, np.maximum(u, -axis.braking), 0.0)
+            down = _moved(step, *down, np.minimum(u, axis.braking), 0.0)
         control, was_free = _fenced(case, up, down, wanted, last, was_free)
         begin = delayed + np.where(late > 0.0, spread, 0)
         queue += [queue[-1]] * (delayed + spread + SUBSTEPS + 1 - len(queue))
@@ -127,11 +128,11 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
         last = control
         for _ in range(SUBSTEPS):
             u = queue.pop(0)
-            certain = np.clip(u, -axis.certain, axis.certain)
+            certain = np.clip(u, -axis.braking, axis.braking)
             had = certain + (share + 1.0) / 2.0 * (u - certain)
             p, v, a = _moved(step, p, v, a, had, d * axis.disturbance * case.excess)
-            most = most * step.fade + np.maximum(u, -axis.certain) * (1.0 - step.fade)
-            least = least * step.fade + np.minimum(u, axis.certain) * (1.0 - step.fade)
+            most = most * step.fade + np.maximum(u, -axis.braking) * (1.0 - step.fade)
+            least = least * step.fade + np.minimum(u, axis.braking) * (1.0 - step.fade)
             farthest = np.maximum(farthest, np.maximum(p - case.high, case.low - p))
     return farthest
 

@@ -1,11 +1,15 @@
-"""The bounds of a vehicle, on which the fence rests: parameters of the node, or of a model file."""
+"""The bounds of a vehicle, on which the fence's proof (docs/geofence_proof.md) rests.
+
+They are parameters of the node, or stand in a model file.
+"""
 
 from dataclasses import fields, replace
 from typing import Any
 
-from crazyflie_geofence.geofence import CERTAIN_HORIZONTAL, LARGEST_HORIZONTAL, LARGEST_VERTICAL
+from crazyflie_geofence.geofence import LARGEST_HORIZONTAL, LARGEST_VERTICAL
 from crazyflie_geofence.viable_set import Axis
 from crazyflie_model.quadrotor import TYPES
+from crazyflie_model.units import GRAVITY
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters import vehicle_model, yaml_file
 from crazyflie_utils.parameters.declaration import ParameterError
@@ -49,17 +53,28 @@ class Bounds(Parameters):
 
 #: Bounds of the Crazyflie 2.1, which no flight of docs/geofence_proof.md exceeds: of vehicles that
 #: are simulated, with velocities from differences of poses; no real vehicle.
-_OF_TYPES = Bounds(
+_CF21 = Bounds(
     horizontal_lag=0.12,
     vertical_lag=0.05,
     delay=0.02,
     horizontal_disturbance=0.6,
     vertical_disturbance=1.0,
     position_error=0.002,
+    velocity_error=0.06,
 )
+_OF_TYPES = {
+    "cf21": _CF21,
+    "cf21_markers": replace(_CF21, velocity_error=0.1),
+    # A heavy one has little thrust to brake with.
+    "cf21plus": replace(_CF21, velocity_error=0.12, vertical_disturbance=1.4),
+    "brushless": replace(_CF21, velocity_error=0.13),
+}
 
-#: e_v of each type (m/s). A battery that sags leaves too little for the attitude of a cf21plus.
-_VELOCITY_ERRORS = {"cf21": 0.06, "cf21_markers": 0.1, "cf21plus": 0.36, "brushless": 0.1}
+SPREAD, PERIOD = 0.01, 0.01  #: Of `Axis` where none are given (s).
+
+#: Share of the rotors' thrust that a battery leaves under load: 3.8 V of 4.2 V. With more thrust
+#: than that, attitude loops have no torque.
+_LOADED = (3.8 / 4.2) ** 2
 
 
 def load(model: str) -> Bounds:
@@ -68,7 +83,7 @@ def load(model: str) -> Bounds:
     `ParameterError` names errors of the file with their lines.
     """
     if model in TYPES:
-        return replace(_OF_TYPES, velocity_error=_VELOCITY_ERRORS[model])
+        return _OF_TYPES[model]
     found = yaml_file.load(model)
     if RESULT not in found or KEY not in found[RESULT]:
         return Bounds()
@@ -94,7 +109,11 @@ def complete(given: Bounds, model: str) -> Bounds:
 
 
 def axes(
-    bounds: Bounds, horizontal: float, vertical: float, spread: float, period: float
+    bounds: Bounds,
+    horizontal: float,
+    vertical: float,
+    spread: float = SPREAD,
+    period: float = PERIOD,
 ) -> tuple[Axis, Axis, Axis]:
     """Return the bounds of x, y and z, which brake with ``horizontal`` and ``vertical``, m/s^2.
 
@@ -102,14 +121,18 @@ def axes(
     """
     of = vars(bounds)
     rest = (of["position_error"], of["velocity_error"], of["delay"], spread, period)
-    largest, sure = LARGEST_HORIZONTAL, max(CERTAIN_HORIZONTAL, horizontal)
-    x = Axis(of["horizontal_lag"], horizontal, largest, of["horizontal_disturbance"], *rest, sure)
-    largest, sure = LARGEST_VERTICAL, vertical
-    z = Axis(of["vertical_lag"], vertical, largest, of["vertical_disturbance"], *rest, sure)
+    x, z = (
+        Axis(of[f"{name}_lag"], braking, largest, of[f"{name}_disturbance"], *rest)
+        for name, braking, largest in (
+            ("horizontal", horizontal, LARGEST_HORIZONTAL),
+            ("vertical", vertical, LARGEST_VERTICAL),
+        )
+    )
     return x, x, z
 
 
 def max_thrust(model: str) -> float:
-    """Return the largest thrust over the mass that a vehicle of a model has, m/s^2."""
+    """Return the largest thrust over the mass that the fence gives a vehicle of a model, m/s^2."""
     figures = vehicle_model.load(model)
-    return min(figures.max_thrust, figures.thrust_limit)
+    of_rotors = GRAVITY * (figures.max_rotor_speed / figures.hover_speed) ** 2
+    return min(figures.max_thrust, figures.thrust_limit, _LOADED * of_rotors)

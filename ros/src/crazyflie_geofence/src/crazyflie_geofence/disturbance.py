@@ -1,4 +1,7 @@
-"""The disturbance that a vehicle meets in flight: what changes its velocity beside its controls."""
+"""The disturbance that a vehicle meets in flight: what changes its velocity beside its controls.
+
+It is compared with the bound D of the proof, docs/geofence_proof.md, which it widens.
+"""
 
 from collections.abc import Sequence
 

@@ -5,7 +5,7 @@ fence predicts position, velocity and acceleration to the time at which the next
 force, from the measured state and the controls that have been sent. While any control leaves the
 vehicle able to stop, the regular control passes. Otherwise each axis is given the nearest one that
 does. What of it the vehicle cannot produce, tilt being limited and under the thrust, is given up on
-the way to accelerations that it always can.
+the way to accelerations that it always can. docs/geofence_proof.md says why it holds.
 """
 
 import math
@@ -24,9 +24,6 @@ from crazyflie_model.units import GRAVITY
 #: Largest acceleration that a control can ask for, along any horizontal line and along z (m/s^2).
 LARGEST_HORIZONTAL = math.sqrt(2.0) * MAX_THRUST * math.sin(MAX_TILT)
 LARGEST_VERTICAL = MAX_THRUST - GRAVITY
-#: Acceleration by one tilt, under the thrust of hover. What is more rests on a thrust that may not
-#: be there yet, or not any more (m/s^2).
-CERTAIN_HORIZONTAL = GRAVITY * math.sin(MAX_TILT)
 
 #: A vehicle outside of the box comes back with this speed at most (m/s), slower on the last metre
 #: (1/s), and changes its speed within this time (s).
@@ -198,7 +195,7 @@ class Geofence:
         if distance < -axis.position_margin:
             return _return(axis, distance, v)
         last = axis.largest if self._last is None else -plane.along(tuple(self._last))
-        return axis.smooth_control(distance, v, a, last)
+        return axis.largest_control(distance, v, a, last, axis.smooth_hold)
 
     def _catch_up(self, time):
         """Advance the accelerations to the last control that is in force at a time."""
@@ -207,14 +204,8 @@ class Geofence:
             # Below the thrust of flights the vehicle stands.
             flies = control[3] >= MIN_THRUST
             u = self._acceleration_of(control, heading) if flies else _HOVER
-            most = [axis.certain for axis in self._axes]
-            self._sent.append(
-                (
-                    sent,
-                    [max(part, -c) for part, c in zip(u, most, strict=True)]
-                    + [max(-part, -c) for part, c in zip(u, most, strict=True)],
-                )
-            )
+            towards = zip((*u, *(-part for part in u)), self._axes * 2, strict=True)
+            self._sent.append((sent, [max(part, -axis.braking) for part, axis in towards]))
             if not flies:
                 self._watch.restart()
         delay = self._axes[0].delay

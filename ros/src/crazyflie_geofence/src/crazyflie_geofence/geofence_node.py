@@ -1,4 +1,4 @@
-"""ROS interface of the geofence."""
+"""ROS interface of the geofence, which `geofence` explains and docs/geofence_proof.md proves."""
 
 from collections.abc import Iterator
 from functools import cached_property, partial
@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_geofence import bounds
-from crazyflie_geofence.bounds import Bounds
+from crazyflie_geofence.bounds import PERIOD, SPREAD, Bounds
 from crazyflie_geofence.geofence import (
     Control,
     Geofence,
@@ -94,10 +94,10 @@ class GeofenceParameters(Parameters):
         Number("s", minimum=0.0, maximum=0.1),
         "how much later than after the delay a control may take effect: merger and fence answer "
         "in any order",
-        0.01,
+        SPREAD,
     )
     period: float = parameter(
-        Number("s", minimum=0.001, maximum=0.1), "longest time from one state to the next", 0.01
+        Number("s", minimum=0.001, maximum=0.1), "longest time from one state to the next", PERIOD
     )
 
     @override

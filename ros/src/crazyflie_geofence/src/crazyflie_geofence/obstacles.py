@@ -2,6 +2,7 @@
 
 An obstacle is convex. The plane of each face separates it from all vehicles outside of the face; a
 round one has a plane for each direction. Those count that face the vehicle, and where it passes.
+The proof (docs/geofence_proof.md) is that of a wall, for each plane.
 """
 
 import math

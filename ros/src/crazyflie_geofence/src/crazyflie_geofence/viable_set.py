@@ -21,9 +21,7 @@ from crazyflie_model.elementwise import Number, where
 
 _ROOT_STEPS = 5  #: Newton steps, after which the distance is exact to 1e-6 m or better.
 _CONTROL_STEPS = 5  #: Newton steps to the largest control.
-#: Time for which the fence's own controls could be held, s. The proof needs a period only, but then
-#: 1 cm/s of noise would change them by 1 m/s^2.
-_SMOOTH = 0.02
+_SMOOTH = 0.02  #: See `Axis.smooth_hold`, s.
 _GRID = 41  #: Speeds and accelerations at which the smallest box is computed.
 
 _SCALAR = SimpleNamespace(exp=math.exp, log=math.log, max=max, min=min)
@@ -61,7 +59,9 @@ class Axis:
     """
 
     tau: float  #: Lag of the acceleration behind the control.
-    braking: float  #: A: acceleration that is always available, either way, m/s^2.
+    #: A: acceleration that is always available, either way, m/s^2. Of what is asked for beyond it, a
+    #: part may be missing: tilt and thrust do not come at once, nor at the same time.
+    braking: float
     largest: float  #: Largest acceleration that a control can ask for, m/s^2; at least A.
     disturbance: float  #: D: largest acceleration beside that of the controls, m/s^2.
     position_error: float  #: Of measured positions.
@@ -69,9 +69,6 @@ class Axis:
     delay: float  #: From a measurement to the earliest time at which its control is in force.
     spread: float  #: From the earliest to the latest such time.
     period: float  #: Longest time from one control to the next.
-    #: Largest acceleration that a control certainly has, m/s^2: of a larger one, a part may be
-    #: missing. Attitude loops and batteries lower the thrust, which changes sooner than the tilt.
-    certain: float = math.inf
 
     def disturbed(self, more: float) -> "Axis":
         """Return the same with a disturbance of at least this (m/s^2), as far as braking allows."""
@@ -108,7 +105,11 @@ class Axis:
         return response(self.period, self.tau)
 
     @cached_property
-    def _smooth_hold(self) -> Response:
+    def smooth_hold(self) -> Response:
+        """For how long the fence's own controls could be held.
+
+        The proof needs a period only, but then 1 cm/s of noise would change them by 1 m/s^2.
+        """
         return response(max(self.period, _SMOOTH), self.tau)
 
     def stopping_distance(self, v: Number, a: Number) -> Number:
@@ -193,22 +194,16 @@ class Axis:
         largest control before.
         """
         f = _functions(up[1])
-        high = self.smooth_control(*up, last[1])
-        low = -self.smooth_control(*down, -last[0])
-        if not np.any(low > high):
-            return low, high
+        high = self.largest_control(*up, last[1], self.smooth_hold)
+        low = -self.largest_control(*down, -last[0], self.smooth_hold)
         contrary = low > high
-        largest = where(contrary, self.largest_control(*up, last[1]), high)
-        smallest = where(contrary, -self.largest_control(*down, -last[0]), low)
-        # In a box of the proof, the smallest is at most the largest.
-        middle = f.max(f.min((smallest + largest) / 2.0, self.braking), -self.braking)
-        return f.min(smallest, f.max(middle, largest)), f.max(largest, f.min(middle, smallest))
-
-    def smooth_control(self, distance: Number, v: Number, a: Number, last: Number) -> Number:
-        """Return the largest control that could also be held for longer; see `largest_control`."""
-        largest = self.largest_control(distance, v, a, last)
-        held = self.largest_control(distance, v, a, last, self._smooth_hold)
-        return _functions(v).min(largest, held)
+        if not np.any(contrary):
+            return low, high
+        # In a box of the proof, those for a period are not contrary.
+        high = where(contrary, self.largest_control(*up, last[1]), high)
+        low = where(contrary, -self.largest_control(*down, -last[0]), low)
+        middle = f.max(f.min((low + high) / 2.0, self.braking), -self.braking)
+        return f.min(low, f.max(middle, high)), f.max(high, f.min(middle, low))
 
     def largest_control(
         self, distance: Number, v: Number, a: Number, last: Number, hold: Response | None = None
@@ -217,10 +212,9 @@ class Axis:
 
         Distance from the wall (m), velocity and acceleration are those predicted for the end of the
         delay; ``last`` is the control before. At least -A, which is safe if the state is. It is in
-        force for a period, or ``hold``.
+        force for a period, or ``hold``; the longer, the smaller it is.
         """
-        hold = hold or self._hold
-        f = _functions(v)
+        f, hold = _functions(v), hold or self._hold
         # A vehicle that may be outside because of its position's error is inside.
         room = f.max(distance - self.position_margin, 0.0) - self.bulge
         v = v + self.velocity_margin
@@ -263,7 +257,7 @@ class Axis:
         # Towards one wall an acceleration may be this much more than away from the other: of the
         # controls that are sent, and of one that may come early or late.
         late = 2.0 * self.largest
-        sent = max(self.largest - self.certain, 0.0)
+        sent = self.largest - self.braking
         gap = sent + late * (1.0 - self._gap.fade)
         both = 2.0 * (self.velocity_error + self.disturbance * t) + sent * self.delay
         both += late * self._gap.held_speed + gap * self.period

@@ -228,16 +228,11 @@ class Flight:
         # Of what is not certain, all is there, or nothing.
         u = certain + (1.0 + self.draw()) / 2.0 * (u - certain)
         d = np.array([self.draw() * axis.disturbance for axis in self.axes])
-        r = [response(PERIOD, axis.tau) for axis in self.axes]
-        t = PERIOD
-        way, held_way, speed, held, fade = np.array(
-            [(e.way, e.held_way, e.speed, e.held_speed, e.fade) for e in r]
-        ).T
-        a = self.acceleration
-        self.position = self.position + self.velocity * t + a * way + u * held_way + d * t * t / 2
-        self.velocity = self.velocity + a * speed + u * held + d * t
-        self.acceleration = a * fade + u * (1.0 - fade)
-        self.time += t
+        state = zip(self.position, self.velocity, self.acceleration, u, d, strict=True)
+        responses = [response(PERIOD, axis.tau) for axis in self.axes]
+        moves = [r.moved(*each) for r, each in zip(responses, state, strict=True)]
+        self.position, self.velocity, self.acceleration = np.array(moves).T
+        self.time += PERIOD
 
 
 @given(

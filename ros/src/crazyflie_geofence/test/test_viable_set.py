@@ -52,13 +52,7 @@ def axes(draw):
 
 def moved(axis, state, u, d, time):
     """Return position, velocity and acceleration after a time of control and disturbance."""
-    p, v, a = state
-    r = response(time, axis.tau)
-    return (
-        p + v * time + a * r.way + u * r.held_way + d * time * time / 2.0,
-        v + a * r.speed + u * r.held_speed + d * time,
-        a * r.fade + u * (1.0 - r.fade),
-    )
+    return response(time, axis.tau).moved(*state, u, d)
 
 
 def stop(axis, state):

@@ -116,8 +116,8 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
         shown = p + e_p * axis.position_error, v + e_v * axis.velocity_error
         up, down = (*shown, most), (*shown, least)
         for u in queue[:delayed]:
-            up = _moved(step, *up, np.maximum(u, -axis.braking), 0.0)
-            down = _moved(step, *down, np.minimum(u, axis.braking), 0.0)
+            up = step.moved(*up, np.maximum(u, -axis.braking), 0.0)
+            down = step.moved(*down, np.minimum(u, axis.braking), 0.0)
         control, was_free = _fenced(case, up, down, wanted, last, was_free)
         begin = delayed + np.where(late > 0.0, spread, 0)
         queue += [queue[-1]] * (delayed + spread + SUBSTEPS + 1 - len(queue))
@@ -130,20 +130,11 @@ def fly(case: Case, policy: Array, seed: int, controller: Controller | None = No
             u = queue.pop(0)
             certain = np.clip(u, -axis.braking, axis.braking)
             had = certain + (share + 1.0) / 2.0 * (u - certain)
-            p, v, a = _moved(step, p, v, a, had, d * axis.disturbance * case.excess)
+            p, v, a = step.moved(p, v, a, had, d * axis.disturbance * case.excess)
             most = most * step.fade + np.maximum(u, -axis.braking) * (1.0 - step.fade)
             least = least * step.fade + np.minimum(u, axis.braking) * (1.0 - step.fade)
             farthest = np.maximum(farthest, np.maximum(p - case.high, case.low - p))
     return farthest
-
-
-def _moved(step, p, v, a, u, d):
-    t = step.time
-    return (
-        p + v * t + a * step.way + u * step.held_way + d * t * t / 2.0,
-        v + a * step.speed + u * step.held_speed + d * t,
-        a * step.fade + u * (1.0 - step.fade),
-    )
 
 
 def _fenced(case, up, down, wanted, last, was_free):

@@ -83,7 +83,7 @@ class Geofence:
         self.buffer = 0.0
         self._max_thrust = min(max_thrust, MAX_THRUST)
         # Towards the upper walls of the axes, then towards the lower ones (m/s^2).
-        self._acceleration = [0.0] * 6
+        self._acceleration: Sequence[float] = [0.0] * 6
         self._in_force = [0.0] * 6  # Commanded ones.
         self._time: float | None = None  # Of the accelerations.
         self._new: deque[tuple[float, Control, float]] = deque(maxlen=_MEMORY)
@@ -218,11 +218,9 @@ class Geofence:
         # A clock that has stepped back belongs to another run.
         elapsed = 0.0 if self._time is None else max(time - self._time, 0.0)
         self._time = time
-        gained = []
-        for i, r in enumerate(self._responses(elapsed)):
-            a, u = self._acceleration[i], self._in_force[i]
-            gained.append(a * r.speed + u * r.held_speed)
-            self._acceleration[i] = a * r.fade + u * (1.0 - r.fade)
+        states = zip(self._responses(elapsed), self._acceleration, self._in_force, strict=True)
+        moves = [r.moved(0.0, 0.0, a, u, 0.0) for r, a, u in states]
+        _, gained, self._acceleration = zip(*moves, strict=True)
         self._watch.gain(gained)
 
     def _responses(self, duration):
@@ -240,13 +238,10 @@ class Geofence:
         pieces.append((self._responses(time + delay - start), in_force))
         moves = []
         for i, v in enumerate((*velocity, *(-v for v in velocity))):
-            way, a = 0.0, self._acceleration[i]
+            state = 0.0, v, self._acceleration[i]
             for responses, controls in pieces:
-                r, u = responses[i], controls[i]
-                way += v * r.time + a * r.way + u * r.held_way
-                v += a * r.speed + u * r.held_speed
-                a = a * r.fade + u * (1.0 - r.fade)
-            moves.append((way, v, a))
+                state = responses[i].moved(*state, controls[i], 0.0)
+            moves.append(state)
         return moves
 
     def _acceleration_of(self, control, yaw):

@@ -42,6 +42,18 @@ class Response(NamedTuple):
     held_speed: float  #: Velocity by a control of 1 m/s^2 (s).
     held_way: float  #: Distance by it (s^2).
 
+    def moved(self, p: Any, v: Any, a: Any, u: Any, d: Any) -> tuple[Any, Any, Any]:
+        """Return position, velocity and acceleration after the time.
+
+        Control and disturbance (m/s^2) are constant meanwhile. Floats, or arrays for many vehicles.
+        """
+        t = self.time
+        return (
+            p + v * t + a * self.way + u * self.held_way + d * t**2 / 2.0,
+            v + a * self.speed + u * self.held_speed + d * t,
+            a * self.fade + u * (1.0 - self.fade),
+        )
+
 
 def response(time: float, tau: float) -> Response:
     """Return the coefficients of a time and a lag (s)."""
@@ -59,8 +71,8 @@ class Axis:
     """
 
     tau: float  #: Lag of the acceleration behind the control.
-    #: A: acceleration that is always available, either way, m/s^2. Of what is asked for beyond it, a
-    #: part may be missing: tilt and thrust do not come at once, nor at the same time.
+    #: A: acceleration that is always available, either way, m/s^2. Of what is asked for beyond it,
+    #: a part may be missing: tilt and thrust do not come at once, nor at the same time.
     braking: float
     largest: float  #: Largest acceleration that a control can ask for, m/s^2; at least A.
     disturbance: float  #: D: largest acceleration beside that of the controls, m/s^2.
@@ -148,12 +160,7 @@ class Axis:
 
     def _after(self, v, a, gap, u, hold):
         d = self.disturbance
-        way = 0.0
-        for r, control in ((self._gap, gap), (hold, u)):
-            way = way + v * r.time + a * r.way + control * r.held_way + d * r.time**2 / 2.0
-            v = v + a * r.speed + control * r.held_speed + d * r.time
-            a = a * r.fade + control * (1.0 - r.fade)
-        return way, v, a
+        return hold.moved(*self._gap.moved(0.0, v, a, gap, d), u, d)
 
     @cached_property
     def _coarse(self) -> tuple[float, float, float, float]:

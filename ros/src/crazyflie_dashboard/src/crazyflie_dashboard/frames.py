@@ -50,7 +50,7 @@ class Frames:
         """Forget all frames."""
         for known in (self.poses, self.rejected, self._latest, self._counts):
             known.clear()
-        self._tree = FrameTree(self._on_rejected, self._ahead, self._on_new)
+        self._tree = FrameTree(self._on_rejected, self._ahead)
 
     def read(self, raw: bytes) -> None:
         """Store a serialized tf2_msgs/TFMessage."""
@@ -73,7 +73,9 @@ class Frames:
         now = self._time()
         elapsed = now - self._counted_since
         for child, entry in self._latest.items():
-            self._tree.take(decode_pose(entry), self._nanoseconds())
+            pose = decode_pose(entry)
+            if self._tree.take(pose, self._nanoseconds()):
+                self._on_new(pose)
             if elapsed >= 1.0 and child in self.poses:
                 self.poses[child].rate = self._counts[child] / elapsed
         self._latest.clear()

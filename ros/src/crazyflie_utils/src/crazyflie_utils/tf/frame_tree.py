@@ -186,16 +186,11 @@ class FrameTree:
 
     ``warn(text, key)`` is called for every dropped transform; the key identifies the reason.
     ``ahead`` is how far the stamp of a transform may be ahead of now, s; up to ``clock_delay`` (s)
-    beyond it is dropped without a warning. ``on_new(pose)`` is called with every pose that is the
-    latest of its frame.
+    beyond it is dropped without a warning.
     """
 
     def __init__(
-        self,
-        warn: Callable[[str, Hashable], None],
-        ahead: float,
-        on_new: Callable[[StampedPose], None],
-        clock_delay: float = 0.0,
+        self, warn: Callable[[str, Hashable], None], ahead: float, clock_delay: float = 0.0
     ):
         self.rejected: Counter[str] = Counter()  #: Number of dropped transforms by reason.
         #: Frames that are decoded; and the name that is not allowed.
@@ -203,7 +198,6 @@ class FrameTree:
         self._warn = warn
         self._ahead = round(ahead * 1e9)
         self._clock_delay = round(clock_delay * 1e9)
-        self._on_new = on_new
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
@@ -258,22 +252,24 @@ class FrameTree:
             self.rejected["cannot be read"] += 1
             self._warn("ignoring a message on /tf that cannot be read", "cannot be read")
 
-    def take(self, pose: StampedPose, now: int) -> None:
-        """Process a pose at the ROS time ``now`` (ns); reject an invalid one."""
+    def take(self, pose: StampedPose, now: int) -> bool:
+        """Process a pose at the ROS time ``now`` (ns); return whether it is new, and the latest.
+
+        An invalid one is rejected.
+        """
         if not self._is_valid(pose):
-            return
+            return False
         stamp, frame = pose.stamp, self._frames.get(pose.child)
         if stamp > now + self._ahead:
             # Before the first /clock of a running simulation, now is 0.
             if now:
                 warns = stamp > now + self._ahead + self._clock_delay
                 self._reject(pose, "is stamped in the future", warns)
-            return
+            return False
         if frame is not None and stamp < frame.latest.stamp - _STEP_BACK:
             frame.steps_back += 1
             if frame.steps_back < _STEPS_BACK:
-                self._reject(pose, "is stamped in the past")
-                return
+                return self._reject(pose, "is stamped in the past")
             # The last pose before the clock was set back would stay the latest until the stamps
             # have caught up.
             self.clear()
@@ -282,17 +278,18 @@ class FrameTree:
             frame = self._frames[pose.child] = _Frame(pose)
             self._notice(pose, now)
         elif stamp == frame.latest.stamp:
-            return
-        if stamp >= frame.latest.stamp:
+            return False
+        is_latest = stamp >= frame.latest.stamp
+        if is_latest:
             if pose.parent != frame.latest.parent:
                 self._notice(pose, now)
             frame.latest = pose
             frame.steps_back = 0
-            self._on_new(pose)
         if frame.recent is not None:
             frame.recent.append(pose)
         else:
             self._tf2.set_transform(pose.message(), "tf")
+        return is_latest
 
     def take_static(self, pose: StampedPose, now: int) -> None:
         """Process a static pose; reject an invalid one."""
@@ -368,8 +365,7 @@ class FrameTree:
 
     def _reject(self, pose, reason, warns=True):
         self.rejected[reason] += 1
-        if not warns:
-            return False
-        text = f"ignoring a transform {pose.parent[:50]} -> {pose.child[:50]} that {reason}"
-        self._warn(text, (pose.parent, pose.child, reason))
+        if warns:
+            text = f"ignoring a transform {pose.parent[:50]} -> {pose.child[:50]} that {reason}"
+            self._warn(text, (pose.parent, pose.child, reason))
         return False

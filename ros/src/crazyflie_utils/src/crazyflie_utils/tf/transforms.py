@@ -55,14 +55,13 @@ class Transforms:
         self._topics = topics
         self._static: dict[str, TransformStamped] = {}
         self._now = now
-        self._tree = FrameTree(warn, ahead, self._note_arrival, clock_delay)
+        self._tree = FrameTree(warn, ahead, clock_delay)
         self._publisher: Any = None
         self._own: RawTransforms | None = None
         self._broadcasters = 0
         self._gathered: list[StampedPose] | None = None
         self._subscriber: Subscriber | None = None
         self._listeners: dict[str, list[_Listener]] = {}
-        self._arrived: list[_Listener] = []
         self._sources: list[Callable[[], None]] = []
         # Each external broadcaster has a thread of its own.
         self._lock = threading.RLock()
@@ -202,17 +201,12 @@ class Transforms:
     def _take(self, poses):
         now = self._now()
         with self._lock:
-            for pose in poses:
-                self._tree.take(pose, now)
-            arrived, self._arrived = self._arrived, []
+            new = [pose for pose in poses if self._tree.take(pose, now)]
         # Without the lock, since callbacks may look up poses.
-        for listener in arrived:
-            listener.callback()
-
-    def _note_arrival(self, pose):
-        for listener in self._listeners.get(pose.child, ()):
-            if listener.is_due(pose.stamp):
-                self._arrived.append(listener)
+        for pose in new:
+            for listener in self._listeners.get(pose.child, ()):
+                if listener.is_due(pose.stamp):
+                    listener.callback()
 
     def _on_static(self, message):
         with self._lock:

@@ -169,6 +169,17 @@ def test_near_a_wall_a_control_that_is_safe_is_passed_bit_for_bit():
     assert (control, priority) == (HOVER, 1.0)
 
 
+def test_a_clock_that_steps_back_leaves_it_at_work():
+    position, velocity = (UPPER[0] - 0.3, 0.1, 1.4), (1.5, 0.0, 0.0)
+    before = hovering().control(0.0, position, velocity, 0.0, HOVER)
+    made = hovering()
+    for k in range(3):
+        made.sent(90.0 + k * PERIOD, HOVER, 0.0)
+        made.control(90.0 + k * PERIOD, MIDDLE, AT_REST, 0.0, HOVER)
+    made.sent(0.0, HOVER, 0.0)
+    assert made.control(0.0, position, velocity, 0.0, HOVER) == before
+
+
 def test_it_does_not_chatter_at_the_wall():
     flight = Flight()
     flight.fly(lambda t: control_of((2.0, 0.0, 0.0), 0.0), 6.0)

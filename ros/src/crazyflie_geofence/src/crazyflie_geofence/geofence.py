@@ -208,6 +208,9 @@ class Geofence:
             self._sent.append((sent, [max(part, -axis.braking) for part, axis in towards]))
             if not flies:
                 self._watch.restart()
+        if self._time is not None and time < self._time:
+            # The clock has stepped back: what was sent belongs to another run.
+            self._sent = deque(each for each in self._sent if each[0] <= time)
         delay = self._axes[0].delay
         while self._sent and self._sent[0][0] + delay <= time:
             begin, u = self._sent.popleft()

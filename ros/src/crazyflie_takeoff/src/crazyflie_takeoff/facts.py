@@ -104,6 +104,8 @@ class Facts:
         #: The commanded control that flies the vehicle; None while another one does.
         self.flown: Any = None
         self._learned = math.nan
+        #: Time for which the thrust of hover was learned since this flight began (s).
+        self.learned_for = 0.0
         self.vehicle = vehicle
         # The flight, as the server says: its state, or the toggles of in_flight before that.
         self.flight: FlightState | None = None
@@ -199,6 +201,7 @@ class Facts:
                 self._hover_mean.skip(speed)
                 self._last_hover.skip(speed)
             return
+        self.learned_for += step
         lift = lift_of(self.flown)
         self._hover_mean.update(step, lift, speed)
         self._last_hover.update(step, lift, speed)

@@ -8,6 +8,8 @@ from crazyflie_model.units import GRAVITY
 FIRST = 0.5  #: Time of flight as much as which g counts at first, if nothing else is known (s).
 #: Range of the thrust of hover (m/s^2).
 LEAST_HOVER, MOST_HOVER = 0.6 * GRAVITY, 1.4 * GRAVITY
+#: Thrust with which each of them sinks: of one that may be light, and is not seen (m/s^2).
+UNSEEN_THRUST = 0.5 * GRAVITY
 LAG = 0.08  #: Time by which motors and estimator make a speed later than its thrust (s).
 
 

@@ -19,8 +19,6 @@ CLIMB_GAIN = 2.0  #: That speed over the distance from the hover point (1/s).
 KNOWN_TIME = 0.2  #: Time in which a vehicle that hovers at 0.85 g shows it (s): its motors lag.
 #: Largest acceleration of one that does not, over that of a vehicle that hovers at g.
 KNOWN_ACCELERATION = 1.25
-#: Thrust of a vehicle that may be light, and is not seen any more (m/s^2): it sinks.
-UNSEEN_THRUST = 0.5 * GRAVITY
 AVERAGING = 0.12  #: Time over which the thrust of hover is averaged (s).
 
 

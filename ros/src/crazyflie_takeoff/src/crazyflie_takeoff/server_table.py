@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.guards import Guard, first_firing
-from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, UNSEEN_THRUST, LiftOff, has_lifted_off
+from crazyflie_takeoff.hover_thrust import UNSEEN_THRUST
+from crazyflie_takeoff.lift_off import LIFT_OFF_THRUST, LiftOff, has_lifted_off
 from crazyflie_takeoff.motion import PROGRESS, TOUCHDOWN_HEIGHT, Position
 from crazyflie_takeoff.phases import FilterState, FlightState
 from crazyflie_takeoff.profiles import Descent, TakeoffPlan

@@ -35,10 +35,13 @@ from crazyflie_takeoff.guards import (
     Memory,
     first_firing,
 )
+from crazyflie_takeoff.hover_thrust import UNSEEN_THRUST
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.phases import FlightState, Phase
 from crazyflie_utils.refusal import RefusalError
 
+#: Time of flight after which the thrust of hover is known well enough to sink unseen (s).
+LEARNING_TIME = 0.6
 LAST_STATE = 0.7  #: Age of the oldest state from which the motion is predicted (s).
 
 _BY_PHASE = {phase: [row for row in GUARDS if phase in row.phases] for phase in Phase}
@@ -110,7 +113,7 @@ def _enter(memory: Memory, facts: Facts, row: Guard, said: str) -> None:
     lasting = {each.name for each in _BY_PHASE[row.next]} - {row.name}
     memory.firing = {name: since for name, since in memory.firing.items() if name in lasting}
     if before in (Phase.LISTENING, Phase.ON_GROUND, Phase.DOWN):
-        memory.flight_begun = facts.now
+        memory.flight_begun, facts.learned_for = facts.now, 0.0
     if before.follows and not row.next.follows:
         _take_over(memory, facts)
     if row.next is Phase.HOLDING:
@@ -290,6 +293,8 @@ def _substitute(memory, facts):
 def _fly(memory, facts):
     step_, memory.own_at = min(max(facts.now - memory.own_at, 0.0), LAST_STATE), facts.now
     own = memory.fallback.advance(step_, facts.seen, memory.phase is Phase.SINKING)
+    if facts.seen is None and facts.learned_for < LEARNING_TIME:
+        own = own._replace(thrust=min(own.thrust, UNSEEN_THRUST))
     own = within_pause(own, facts.pauses.longest, facts.hover, memory.fallback.climb)
     memory.own = own._replace(thrust=min(own.thrust, MAX_SUBSTITUTE))
     facts.ground.advance(step_, facts.seen, memory.own.thrust / facts.hover)

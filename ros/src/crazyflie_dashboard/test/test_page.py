@@ -12,7 +12,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from fake_dashboard import FakeDashboard, vehicle
+from fake_dashboard import ACTIONS, FakeDashboard, vehicle
 from geometry_msgs.msg import Point, Vector3
 from pages import wait_for
 from selenium.webdriver.common.action_chains import ActionChains
@@ -692,6 +692,12 @@ def test_what_cannot_be_done_is_grey_and_says_why(browser, server):
     # Where the state is not known, a vehicle may be in the air.
     server.dashboard.change("cf1", state="not known")
     wait_for(lambda: why("Land") == "", "Land")
+    # All take off, or none: services of a vehicle that starts come after its poses.
+    server.dashboard.change("cf2", actions=frozenset())
+    browser.choose("cf2")
+    wait_for(lambda: why("Take off") == "take off: no service of cf2 is there for it", "cf2")
+    server.dashboard.change("cf2", actions=ACTIONS)
+    wait_for(lambda: why("Take off") == "", "Take off")
 
 
 def test_all_are_reset_after_an_emergency(browser, server):

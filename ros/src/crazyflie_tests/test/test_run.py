@@ -180,7 +180,8 @@ def test_a_word_that_is_not_there_gets_the_nearest_one(word, hint):
         ("build demo", "build takes no arguments, and was given 'demo'"),
         ("tests --all x", "tests takes no '--all x'"),
         ("course 1 2", "course '1 2': expected the number of a lesson"),
-        ("swarm x", "swarm of x; expected a number of vehicles"),
+        ("swarm x", "swarm of x; expected one number of vehicles"),
+        ("swarm 2 n:=3", "swarm of 2 3; expected one number of vehicles"),
         ("mission README.md", "mission of 'README.md': expected a script that exists"),
     ],
 )

@@ -17,6 +17,7 @@ from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.envelope import Box
 from crazyflie_utils.flight_status import WORDS
+from crazyflie_utils.refusal import listed
 
 #: Names of the rates that are shown, by the topics' roles.
 RATES = {
@@ -219,9 +220,16 @@ def attitude(vehicle: VehicleSnapshot) -> list[int]:
 
 
 def why_not(action: Action, vehicles: Sequence[VehicleSnapshot]) -> str:
-    """Return why the selected vehicles cannot be commanded so, or "": one of them is enough."""
+    """Return why the selected vehicles cannot be commanded so, or "".
+
+    Of a command that all carry out or none, each has to have the service, which may come later than
+    the vehicle; otherwise one that can do it is enough.
+    """
     if not vehicles:
         return "select vehicles first"
+    lacking = [each.name for each in vehicles if action not in each.actions]
+    if action in (Action.TAKEOFF, Action.GO_TO) and 0 < len(lacking) < len(vehicles):
+        return f"{action.value}: no service of {listed(lacking)} is there for it"
     if any(action in offered(each, with_moves=True) for each in vehicles):
         return ""
     states = sorted({each.state for each in vehicles})

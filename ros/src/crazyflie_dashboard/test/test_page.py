@@ -700,6 +700,16 @@ def test_what_cannot_be_done_is_grey_and_says_why(browser, server):
     wait_for(lambda: why("Take off") == "", "Take off")
 
 
+def test_those_land_that_fly(browser, server):
+    server.dashboard.change("cf1", position=(-1.0, 0.0, 1.0), is_in_flight=True, state="flying")
+    browser.take_control()
+    browser.press("All")
+    browser.press("Land")
+    wait_for(lambda: server.dashboard.commands, "a command")
+    # Where the state is not known, as of cf3, a vehicle may be in the air.
+    assert server.actions() == [(Action.LAND, ("cf1", "cf3"))]
+
+
 def test_all_are_reset_after_an_emergency(browser, server):
     browser.take_control()
     browser.press("All")

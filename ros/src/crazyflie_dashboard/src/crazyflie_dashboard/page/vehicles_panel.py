@@ -159,11 +159,12 @@ class VehiclesPanel:
         elif action is Action.GO_TO:
             yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
             details = {"goal": self._typed, "yaw": yaw}
-        elif action is Action.HOLD:
-            self._sent = None
-        elif action is Action.RESET:
-            vehicles = self._session.vehicles
-            names = [name for name in names if vehicles[name].is_emergency]
+        else:
+            self._sent = None if action is Action.HOLD else self._sent
+            # A fleet refuses what one of the vehicles cannot do, as a landing on the ground.
+            known = self._session.vehicles
+            able = [n for n in names if n in known and action in offered(known[n], with_moves=True)]
+            names = able or names
         if await self._session.command(action, names, clicked, **details) and "goal" in details:
             self._sent = details["goal"]
 

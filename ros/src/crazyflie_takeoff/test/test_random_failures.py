@@ -125,6 +125,7 @@ def test_a_server_that_is_restarted_in_the_fall_after_a_lost_liftoff_lifts_nothi
 
 def test_a_vehicle_of_which_too_little_was_seen_to_know_its_weight_sinks():
     """The filter hovered with 1.25 times the thrust of hover, unseen: it rose to 44 m."""
-    rise, touchdown_speed = fly(0.65, 0.6, False, [("camera", 0.113, 60.0), ("server", 0.692, 0.05)])
+    failures = [("camera", 0.113, 60.0), ("server", 0.692, 0.05)]
+    rise, touchdown_speed = fly(0.65, 0.6, False, failures)
     assert rise < 0.0
     assert touchdown_speed < 2.0

@@ -18,7 +18,7 @@ from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
 from crazyflie_reports.what_if import FAILED, WORSE, Options, compare, main
 from crazyflie_utils import launch_file
-from crazyflie_utils.journal.journal_file import JournalWriter
+from crazyflie_utils.journal.journal_file import Journal, JournalWriter, Kind
 from crazyflie_utils.journal.recording import Recorder
 from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.testing.fake_graph import FakeGraph
@@ -274,6 +274,23 @@ def test_a_cut_journal_is_read_to_the_damage(journals, tmp_path, capsys):
     path.write_bytes(content[: len(content) * 2 // 3])
     main([str(folder), "--nodes", "estimator", "--out", str(tmp_path / "out")])
     assert "lqr_controller.journal is read to where" in capsys.readouterr().out
+
+
+def test_a_journal_whose_class_is_gone_is_no_success(journals, tmp_path, capsys):
+    rows = Journal(journals[0] / "lqr_controller.journal").rows()
+    path = tmp_path / "gone.journal"
+    program = "crazyflie_lqr.lqr_nodes:GoneNode"
+    header = {"node": "/lqr_controller", "program": program, "clock": "steady", "us": 0}
+    writer = JournalWriter(path, header, 1e9, print)
+    for row in rows:
+        # The class is not in any row of a process with ROS.
+        if row.kind is not Kind.LAUNCH:
+            writer.row(row.kind, row.number, row.value, row.data)
+    writer.close()
+    assert main([str(path), "--out", str(tmp_path / "out")]) == FAILED
+    error = capsys.readouterr().err
+    assert "has no node that can be run again" in error
+    assert f"there is no {program} any more" in error
 
 
 def without(path, *topics):

@@ -228,6 +228,9 @@ def _find_frame(given: FlightInput, log: bag_log.BagLog, namespace: str) -> str:
 def _interfaces(given: FlightInput, options: Options) -> dict[str, Interface]:
     """Return the chosen nodes, with the parameters that are asked for."""
     names = sorted(given.classes)
+    if not names:
+        why = "\n".join(given.remarks)
+        raise InputError(f"{options.recording} has no node that can be run again\n{why}")
     unknown = [part for part in options.nodes if not any(part in each for each in names)]
     if unknown:
         raise InputError(f"--nodes {unknown[0]}: no such node; expected of {', '.join(names)}")

@@ -66,7 +66,7 @@ _OF_TYPES = {
     "cf21": _CF21,
     "cf21_markers": replace(_CF21, velocity_error=0.1),
     # A heavy one has little thrust to brake with.
-    "cf21plus": replace(_CF21, velocity_error=0.12, vertical_disturbance=1.4),
+    "cf21plus": replace(_CF21, velocity_error=0.16, vertical_disturbance=1.4),
     "brushless": replace(_CF21, velocity_error=0.13),
 }
 

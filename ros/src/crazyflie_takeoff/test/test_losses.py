@@ -117,7 +117,7 @@ def test_it_holds_the_vehicle_with_the_thrust_that_was_learned():
 
 
 def test_what_the_last_control_has_done_is_ended_without_a_step():
-    flight = Flight().run(1.0).lose()
+    flight = Flight().run(2.5).lose()
     flight.fly(flight.filter.commanded(flight.time, 16.0, level(16.0)))
     begin = len(flight.flown)
     flight.run(0.11)

@@ -54,7 +54,7 @@ def test_a_vehicle_that_is_carried_exceeds_no_limit():
 
 
 def test_on_a_busy_computer_a_control_that_has_come_back_fades_in_all_the_same():
-    flight = Flight().run(1.0).lose(pose=False).run(0.2)
+    flight = Flight().run(2.5).lose(pose=False).run(0.2)
     flight.ticks += 20
     own = flight.filter.tick(flight.time).thrust
     # It may stay the last one for a while.

@@ -40,8 +40,9 @@ from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.phases import FlightState, Phase
 from crazyflie_utils.refusal import RefusalError
 
-#: Time of flight after which the thrust of hover is known well enough to sink unseen (s).
-LEARNING_TIME = 0.6
+#: Time of flight before which the thrust of hover is not known, and before which it may be as much
+#: too high as is left of it here, to sink unseen (s).
+GUESS_TIME, LEARNING_TIME, LEARNING_SHARE = 0.6, 2.0, 0.9
 LAST_STATE = 0.7  #: Age of the oldest state from which the motion is predicted (s).
 
 _BY_PHASE = {phase: [row for row in GUARDS if phase in row.phases] for phase in Phase}
@@ -294,7 +295,9 @@ def _fly(memory, facts):
     step_, memory.own_at = min(max(facts.now - memory.own_at, 0.0), LAST_STATE), facts.now
     own = memory.fallback.advance(step_, facts.seen, memory.phase is Phase.SINKING)
     if facts.seen is None and facts.learned_for < LEARNING_TIME:
-        own = own._replace(thrust=min(own.thrust, UNSEEN_THRUST))
+        is_guess = facts.learned_for < GUESS_TIME
+        most = UNSEEN_THRUST if is_guess else LEARNING_SHARE * facts.hover
+        own = own._replace(thrust=min(own.thrust, most))
     own = within_pause(own, facts.pauses.longest, facts.hover, memory.fallback.climb)
     memory.own = own._replace(thrust=min(own.thrust, MAX_SUBSTITUTE))
     facts.ground.advance(step_, facts.seen, memory.own.thrust / facts.hover)

@@ -65,6 +65,19 @@ def test_a_state_that_does_not_exist_is_ignored():
     assert "ignoring state 77" in process.logged("warn")[-1]
 
 
+def test_a_takeoff_that_waited_for_the_first_state_is_no_lost_one():
+    """It was judged at a time before that state, and ended at once."""
+    process = launch(SERVER)
+    takeoff = call(process, "/takeoff")
+    process.publish("/in_flight_filter_status", filter_status("unknown"))
+    process.advance(0.3)
+    for _ in range(5):
+        process.publish("/state", state(0.0))
+        process.advance(0.01)
+    assert not takeoff.done()
+    assert states(process)[-1] == "taking_off"
+
+
 def test_calls_wait_until_it_is_known_where_the_flight_stands():
     process = launch()
     first, second = call(process, "/takeoff"), call(process, "/takeoff")

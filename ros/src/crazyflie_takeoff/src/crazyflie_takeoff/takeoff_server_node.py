@@ -289,6 +289,8 @@ class TakeoffServerNode(Node):
     def _recover(self):
         self._recovery_timer.stop()
         flight, position = self._flight, self._measured_position()
+        # A takeoff that has waited begins before the first tick.
+        flight.time = self._handle.time()
         flight.recover(position, self._parameters.ground)
         self._log_recovery(None if position is None else position[2] - flight.ground)
         self._serve_waiting()

@@ -40,9 +40,9 @@ from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.phases import FlightState, Phase
 from crazyflie_utils.refusal import RefusalError
 
-#: Time of flight before which the thrust of hover is not known, and before which it may be as much
-#: too high as is left of it here, to sink unseen (s).
-GUESS_TIME, LEARNING_TIME, LEARNING_SHARE = 0.6, 2.0, 0.9
+GUESS_TIME = 0.6  #: Learning time before which the thrust of hover is not known (s).
+LEARNING_TIME = 2.0  #: Learning time before which it may be some per cent too high (s).
+LEARNING_SHARE = 0.9  #: Share of it with which a vehicle surely sinks then.
 LAST_STATE = 0.7  #: Age of the oldest state from which the motion is predicted (s).
 
 _BY_PHASE = {phase: [row for row in GUARDS if phase in row.phases] for phase in Phase}

@@ -52,8 +52,8 @@ class Among(Flight):
 @pytest.mark.parametrize("shape", [PILLAR, TABLE, BALL])
 @pytest.mark.parametrize("beside", [0.0, 0.05, -0.2])
 def test_flown_straight_at_an_obstacle_it_does_not_touch_it(shape, beside):
-    # Around a round one it slides, with more than A of which it may have none.
-    room = 0.2 if beside and shape is not TABLE else 0.1
+    # Around a round one it slides: of the part of its controls beyond A it may have none.
+    room = 0.18 if beside and shape is not TABLE else 0.1
     flight = Among(shape, position=(-1.5, shape.centre[1] + beside, shape.centre[2] + 0.1))
 
     def straight(t):

@@ -163,6 +163,22 @@ def test_a_fence_that_is_switched_off_has_no_box():
     assert flight.flies
 
 
+def test_near_a_wall_a_control_that_is_safe_passes_in_its_own_period(flight):
+    flight.refer(1.35, 0.0, 1.0)
+    flight.graph.advance(6.0)
+    regular, merged = {}, {}
+    for topic, found in (("/control/lqr", regular), ("/control/merged", merged)):
+        flight.graph.listen(
+            topic, lambda m, found=found: found.update({m.header.stamp.to_nsec(): m.control})
+        )
+    priorities = []
+    flight.graph.listen("/control/geofence", lambda m: priorities.append(m.control.priority))
+    flight.refer(1.42, 0.3, 1.1)
+    flight.graph.advance(4.0)
+    assert sum(priorities) > 10.0
+    assert all(merged[stamp] == control for stamp, control in regular.items())
+
+
 @pytest.mark.parametrize("controller", ["position_velocity_yaw", "full_state"])
 def test_another_controller_does_not_leave_the_box_either(controller):
     """The fence has the state of 7 numbers, the controller its own."""

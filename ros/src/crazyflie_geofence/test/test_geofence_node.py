@@ -48,8 +48,10 @@ def publish_state(process, *values, stamp=12.5):
     process.publish("/state", message)
 
 
-def publish_regular(process, *values):
-    process.publish("/control/lqr", ControlStamped(control=Control(*values)))
+def publish_regular(process, *values, stamp=0.0):
+    message = ControlStamped(control=Control(*values))
+    message.header.stamp = process.clock.stamp(stamp)
+    process.publish("/control/lqr", message)
 
 
 def test_answers_a_state_with_what_the_fence_says(process):
@@ -62,6 +64,52 @@ def test_answers_a_state_with_what_the_fence_says(process):
     np.testing.assert_array_equal(to_vector(message.control.control), control)
     assert message.control.priority == priority == 1.0
     assert message.header.stamp.to_sec() == 12.5
+
+
+def test_a_controller_that_answers_each_state_is_waited_for(process):
+    """Near a wall the vehicle would have its regular control of the state before, otherwise."""
+
+    def answers():
+        return [
+            (m.header.stamp.to_sec(), m.control.control.yaw_dot)
+            for m in process.published("/control/geofence")
+        ]
+
+    publish_state(process, *STATE, stamp=1.0)
+    publish_regular(process, *REGULAR[:2], 0.1, 9.81, stamp=1.0)
+    publish_state(process, *STATE, stamp=2.0)
+    assert answers() == [(1.0, 0.1)]
+    publish_regular(process, *REGULAR[:2], 0.2, 9.81, stamp=2.0)
+    assert answers()[1:] == [(2.0, 0.2)]
+    # It has answered first.
+    publish_regular(process, *REGULAR[:2], 0.3, 9.81, stamp=3.0)
+    publish_state(process, *STATE, stamp=3.0)
+    assert answers()[2:] == [(3.0, 0.3)]
+    # It is waited for once, until it answers again.
+    for stamp in (4.0, 5.0, 6.0):
+        publish_state(process, *STATE, stamp=stamp)
+    assert answers()[3:] == [(5.0, 0.3), (6.0, 0.3)]
+    publish_regular(process, *REGULAR[:2], 0.6, 9.81, stamp=6.0)
+    publish_state(process, *STATE, stamp=7.0)
+    assert len(answers()) == 5
+    # Of whatever state, it is the newest.
+    publish_regular(process, *REGULAR[:2], 0.7, 9.81, stamp=6.5)
+    assert answers()[5:] == [(7.0, 0.7)]
+
+
+def test_what_was_sent_while_it_was_waited_for_is_not_in_force_at_once():
+    """The prediction begins with the state, and what was sent since is replaced by the answer."""
+    answers = []
+    for is_sent in (False, True):
+        fake, others = FakeProcess(), {"topics/final_control": "/sent"}
+        assert fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, **others})
+        publish_state(fake, 1.85, *STATE[1:3], 0.18, *STATE[4:], stamp=1.0)
+        fake.advance(0.002)
+        if is_sent:
+            fake.publish("/sent", ControlStamped(control=Control(0.2, 0.2, 0.0, 12.0)))
+        publish_regular(fake, *REGULAR, stamp=1.0)
+        answers += [m.control.control for m in fake.published("/control/geofence")]
+    assert answers[0] == answers[1] != Control(*REGULAR)
 
 
 def test_in_the_middle_the_regular_control_is_untouched(process):

@@ -236,6 +236,9 @@ class Geofence:
         delay, in_force, start = self._axes[0].delay, self._in_force, time
         pieces = []
         for begin, following in self._sent:
+            if begin > time:
+                # Sent since: what answers the state replaces it.
+                break
             pieces.append((self._responses(begin + delay - start), in_force))
             start, in_force = begin + delay, following
         pieces.append((self._responses(time + delay - start), in_force))

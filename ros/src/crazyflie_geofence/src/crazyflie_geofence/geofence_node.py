@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import cached_property, partial
 
+import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import Header
 from typing_extensions import override
@@ -145,13 +146,19 @@ class GeofenceParameters(Parameters):
 class GeofenceNode(Node[GeofenceParameters]):
     """Answer every state with a prioritised control that keeps the vehicle in a box.
 
-    Silent until there is a regular control: without one, the merger is silent too.
+    Silent until there is a regular control: without one, the merger is silent too. A controller
+    that has answered the last state is waited for, until the next state: with its control of the
+    state before, a vehicle near a wall would fly a period behind it.
     """
 
     needed_in_flight = True
 
     def __init__(self) -> None:
         self._regular: Control | None = None
+        self._regular_stamp = genpy.Time()
+        self._stamp: genpy.Time | None = None  # Of the last state.
+        #: What arrived when, and was not answered.
+        self._waiting: tuple[float, PositionVelocityYawStateStamped] | None = None
         self._yaw = 0.0
         self._others: dict[str, tuple[float, tuple[float, float, float]]] = {}
 
@@ -185,15 +192,22 @@ class GeofenceNode(Node[GeofenceParameters]):
         self._others[name] = self._handle.time(), (x, y, z)
 
     def _on_control(self, message):
-        self._regular = to_tuple(message.control)
+        self._regular, self._regular_stamp = to_tuple(message.control), message.header.stamp
+        if self._waiting is not None:
+            self._answer()
 
     def _on_final(self, message):
         self._fence.sent(self._handle.time(), to_tuple(message.control), self._yaw)
 
     def _on_state(self, message):
-        if self._regular is None:
-            return
-        now = self._handle.time()
+        self._waiting = self._handle.time(), message
+        follows = self._regular_stamp == self._stamp
+        self._stamp = message.header.stamp
+        if self._regular is not None and (not follows or self._regular_stamp == self._stamp):
+            self._answer()
+
+    def _answer(self):
+        (now, message), self._waiting = self._waiting, None
         x, y, z, vx, vy, vz, self._yaw = to_tuple(message.state)
         self._fence.others = [p for t, p in self._others.values() if 0.0 <= now - t < HOLD_LIMIT]
         u, priority = self._fence.control(now, (x, y, z), (vx, vy, vz), self._yaw, self._regular)

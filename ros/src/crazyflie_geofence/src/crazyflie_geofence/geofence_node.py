@@ -194,7 +194,7 @@ class GeofenceNode(Node[GeofenceParameters]):
     def _on_control(self, message):
         self._regular, self._regular_stamp = to_tuple(message.control), message.header.stamp
         if self._waiting is not None:
-            self._answer()
+            self._answer(*self._waiting, self._regular)
 
     def _on_final(self, message):
         self._fence.sent(self._handle.time(), to_tuple(message.control), self._yaw)
@@ -204,13 +204,13 @@ class GeofenceNode(Node[GeofenceParameters]):
         follows = self._regular_stamp == self._stamp
         self._stamp = message.header.stamp
         if self._regular is not None and (not follows or self._regular_stamp == self._stamp):
-            self._answer()
+            self._answer(*self._waiting, self._regular)
 
-    def _answer(self):
-        (now, message), self._waiting = self._waiting, None
+    def _answer(self, now, message, regular):
+        self._waiting = None
         x, y, z, vx, vy, vz, self._yaw = to_tuple(message.state)
         self._fence.others = [p for t, p in self._others.values() if 0.0 <= now - t < HOLD_LIMIT]
-        u, priority = self._fence.control(now, (x, y, z), (vx, vy, vz), self._yaw, self._regular)
+        u, priority = self._fence.control(now, (x, y, z), (vx, vy, vz), self._yaw, regular)
         if self._parameters.final_topic is None:
             self._fence.sent(now, u, self._yaw)
         prioritized = PrioritizedControlStamped(

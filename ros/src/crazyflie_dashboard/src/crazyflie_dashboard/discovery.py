@@ -99,9 +99,12 @@ def vehicles(graph: Graph) -> list[FoundVehicle]:
     drivers = {"": next(iter(driven - {""}))} if is_shared else {}
     namespaces = flown if is_shared else flown | driven
     namespaces = namespaces or having("pose")
+    driven |= drivers.keys()
+    # Once for all vehicles: a fleet of 100 has thousands of services.
+    names = _by_vehicle(graph.services)
     return [
-        _vehicle(name, drivers.get(name, name), topics, graph.services, name in driven | {*drivers})
-        for name in sorted(namespaces, key=_natural)
+        _vehicle(each, drivers.get(each, each), topics, graph.services, names, each in driven)
+        for each in sorted(namespaces, key=_natural)
     ]
 
 
@@ -135,10 +138,9 @@ def _by_vehicle(services: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def _vehicle(top, driver, topics, services, has_driver):
+def _vehicle(top, driver, topics, services, names, has_driver):
     merged = {**topics.get(driver, {}), **topics.get(top, {})}
     found: dict[Action, Service] = {}
-    names = _by_vehicle(services)
     for action, service in _candidates(top, driver, services):
         if service.name in names:
             found.setdefault(action, replace(service, name=names[service.name]))

@@ -70,12 +70,12 @@ class Frames:
 
     def update(self) -> None:
         """Decode the messages that have come since the last call."""
-        now = self._time()
+        now, moment = self._time(), self._nanoseconds()
         elapsed = now - self._counted_since
         for child, entry in self._latest.items():
             pose = decode_pose(entry)
-            if self._tree.take(pose, self._nanoseconds()):
-                self._on_new(pose)
+            if self._tree.take(pose, moment):
+                self._on_new(pose, now, moment)
             if elapsed >= 1.0 and child in self.poses:
                 self.poses[child].rate = self._counts[child] / elapsed
         self._latest.clear()
@@ -123,9 +123,9 @@ class Frames:
             return None
         return pose.position, pose.rotation
 
-    def _on_new(self, stamped):
-        now, known = self._time(), self.poses.get(stamped.child)
-        delay = max(self._nanoseconds() - stamped.stamp, 0) * 1e-9
+    def _on_new(self, stamped, now, moment):
+        known = self.poses.get(stamped.child)
+        delay = max(moment - stamped.stamp, 0) * 1e-9
         pose = Pose(stamped, now, delay)
         if known is not None:
             pose.velocity, pose.rate = _velocity(known, pose), known.rate

@@ -210,8 +210,9 @@ class GraphModel:
         own = {model.frame for model in self.models.values()} - {None}
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
+        wrong = {each.name: each.message for each in self._diagnostics.wrong()}
         for name, model in self.models.items():
-            model.now = self._snapshot(name, fixed)
+            model.now = self._snapshot(name, fixed, wrong)
             if model.plots is not None:
                 model.plots.take_pose(model.now, "state" in model.vehicle.topics)
         (running, steps), (recording, recorded) = self.missions(), self.recording()
@@ -239,14 +240,14 @@ class GraphModel:
             recorded=recorded,
         )
 
-    def _snapshot(self, name, fixed):
+    def _snapshot(self, name, fixed, wrong):
         """Return the snapshot of a vehicle; one that cannot be drawn must not stop the others."""
         try:
             model = self.models[name]
             now = model.snapshot(self.frames, fixed)
             fence = f"{model.vehicle.namespace}/geofence: certificate".lstrip("/")
-            if not now.reason and (uncertain := self._diagnostics.wrong(fence)):
-                now = replace(now, reason=uncertain[0].message)
+            if not now.reason and fence in wrong:
+                now = replace(now, reason=wrong[fence])
             return replace(now, is_held=True) if name in self._surroundings.held else now
         except Exception as error:
             self.handle.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)

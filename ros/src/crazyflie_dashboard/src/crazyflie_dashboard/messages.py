@@ -45,13 +45,13 @@ class Diagnostics:
         for status in message.status:
             self._status[status.name] = self._time(), status
 
-    def wrong(self, name: str = "") -> list[DiagnosticStatus]:
-        """Return all diagnostics that are not OK, or those of a name, errors first."""
+    def wrong(self) -> list[DiagnosticStatus]:
+        """Return all diagnostics that are not OK, errors first."""
         since = self._time() - _MAX_AGE
         found = [
             status
             for at, status in self._status.values()
-            if at >= since and status.level != DiagnosticStatus.OK and name in ("", status.name)
+            if status.level != DiagnosticStatus.OK and at >= since
         ]
         return sorted(found, key=lambda each: (-each.level, each.name))
 

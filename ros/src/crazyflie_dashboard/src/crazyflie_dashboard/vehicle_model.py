@@ -3,6 +3,7 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any
 
 import roslib.message
@@ -119,15 +120,6 @@ class VehicleModel:
         position, rotation, velocity, age = self._pose(frames, fixed)
         reference = self._newest.get("reference")
         control_at = self._arrivals.get("final_control", self._arrivals.get("cmd_vel"))
-        flight, held, driver, (volts,) = (self._newest[role] for role in _UNHEARD)
-        state, reason = self._words(flight, held, driver)
-        is_flying = bool(driver.supervisor & VehicleStatus.FLYING)
-        if "flight_status" in self.vehicle.topics:
-            is_flying = flight.state not in _ON_GROUND
-        battery = _known(volts)
-        is_low = battery is not None and battery < _LOW_BATTERY
-        if driver.battery != VehicleStatus.BATTERY_UNKNOWN:
-            is_low = driver.battery >= VehicleStatus.BATTERY_LOW
         rates = dict(self._rates)
         if self.frame in frames.poses:
             rates["pose"] = frames.poses[self.frame].rate
@@ -142,17 +134,33 @@ class VehicleModel:
             is_stale=age is None or age > STALE_AGE,
             reference=reference and reference[:3],
             control_age=None if control_at is None else self._time() - control_at,
-            state=state,
-            reason=reason,
-            takeoff_refusal=flight.takeoff_refusal or held.takeoff_refusal,
-            is_in_flight=is_flying,
-            is_emergency=held.state == FilterStatus.EMERGENCY or driver.is_emergency,
-            battery=battery,
-            is_battery_low=is_low,
-            link_quality=_known(driver.link_quality),
             rates=rates,
             actions=self.vehicle.actions,
+            **self._reported,
         )
+
+    @cached_property
+    def _reported(self) -> dict[str, Any]:
+        """Return what only the messages of `_UNHEARD` say."""
+        flight, held, driver, (volts,) = (self._newest[role] for role in _UNHEARD)
+        state, reason = self._words(flight, held, driver)
+        is_flying = bool(driver.supervisor & VehicleStatus.FLYING)
+        if "flight_status" in self.vehicle.topics:
+            is_flying = flight.state not in _ON_GROUND
+        battery = _known(volts)
+        is_low = battery is not None and battery < _LOW_BATTERY
+        if driver.battery != VehicleStatus.BATTERY_UNKNOWN:
+            is_low = driver.battery >= VehicleStatus.BATTERY_LOW
+        return {
+            "state": state,
+            "reason": reason,
+            "takeoff_refusal": flight.takeoff_refusal or held.takeoff_refusal,
+            "is_in_flight": is_flying,
+            "is_emergency": held.state == FilterStatus.EMERGENCY or driver.is_emergency,
+            "battery": battery,
+            "is_battery_low": is_low,
+            "link_quality": _known(driver.link_quality),
+        }
 
     def _subscribe(self, handle, role):
         if role not in self.vehicle.topics:
@@ -174,6 +182,7 @@ class VehicleModel:
 
     def _note(self, role, content):
         self._newest[role] = content
+        self.__dict__.pop("_reported", None)
         # A voltage that was known stays until there is another one; 0 V is no measurement.
         if role == "vehicle_status" and _known(content.battery_voltage):
             self._newest["battery"] = (content.battery_voltage,)

@@ -120,7 +120,7 @@ class FakeDashboard:
     def change(self, name, **details):
         """Change a vehicle."""
         vehicles = dict(self._scene.vehicles)
-        vehicles[name] = replace(vehicles[name], **details)
+        vehicles[name] = vehicles[name]._replace(**details)
         self._scene = replace(self._scene, vehicles=vehicles)
 
     def scene(self):

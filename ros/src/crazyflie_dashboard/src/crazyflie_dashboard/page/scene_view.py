@@ -1,6 +1,5 @@
 """The three-dimensional scene: the server's part, which sends data to scene_view.js."""
 
-import math
 import time
 from base64 import b64encode
 from collections import deque
@@ -10,11 +9,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import roslib.packages
-from nicegui import core, ui
+from nicegui import core, json, ui
 from nicegui.element import Element
 
-from crazyflie_dashboard.snapshot import Rotation, Scene, Solids, Triple, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Scene, Solids, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
 #: Number of unanswered scenes after which a browser is sent no more, for `ANSWER_LIMIT` at most.
@@ -24,6 +24,7 @@ PART_TIME = 1e-5  #: Time between two transmissions of solids, for each of them 
 #: Colors of vehicles, for plans and plots; they can be read on a light page and on a dark one.
 COLORS = ("#2f86dd", "#d07c00", "#9a68e8", "#0e9aa7", "#db4f98", "#6d9a1f", "#7b8798", "#a9794a")
 DIGITS = 4  #: Decimal places of positions (m) and quaternions that the browser is sent.
+_NOWHERE = (np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, 1.0)  # Not a number is null in JSON.
 
 ui.scene  # noqa: B018  Registers three.js.
 
@@ -104,13 +105,14 @@ class SceneView(
         fences = [[box.lower, box.upper, *place] for box, *place in scene.fences]
         self._send("setFences", [fences])
         self._send("setPaths", [path_rows(scene)])
-        frames = [[name, *_pose(place, turn)] for name, place, turn in scene.frames]
+        frames = [[name, *_rounded((*place, *turn))] for name, place, turn in scene.frames]
         self._send("setFrames", [frames])
         rows = vehicle_rows(scene, chosen)
         if self._shown.get("update") != rows and self._may_send():
             self._shown["update"] = rows
             self._unanswered.append(time.monotonic())
             # Sent as an event: the browser would compile, and keep for long, each call of a method.
+            # As one text: socket.io looks for bytes in each part of a list.
             await core.sio.emit("vehicles", rows, room=self.client.id, callback=self._on_answer)
 
     def _may_send(self) -> bool:
@@ -141,16 +143,19 @@ class SceneView(
             self.run_method(method, *arguments)
 
 
-def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
-    """Return the vehicles as scene_view.js draws them."""
-    rows = []
-    for name, vehicle in scene.vehicles.items():
-        pose = _pose(vehicle.position, vehicle.rotation)
+def vehicle_rows(scene: Scene, chosen: set[str]) -> str:
+    """Return the vehicles as scene_view.js draws them, as JSON."""
+    vehicles = scene.vehicles.values()
+    poses = np.array([(*(each.position or _NOWHERE[:3]), *each.rotation) for each in vehicles])
+    poses = poses.reshape(-1, 7).round(DIGITS)
+    poses[~np.isfinite(poses).all(axis=1)] = _NOWHERE
+    rows: list[list[Any]] = poses.tolist()
+    for row, vehicle in zip(rows, vehicles, strict=True):
         age = f"{vehicle.pose_age:.0f} s old" if vehicle.is_stale and vehicle.pose_age else ""
         remark = "emergency" if vehicle.is_emergency else age or ("held" if vehicle.is_held else "")
-        reference = _rounded(vehicle.reference or ())
-        rows.append([*pose, condition(vehicle), name in chosen, remark, *reference])
-    return rows
+        row += [condition(vehicle), vehicle.name in chosen, remark]
+        row += _rounded(vehicle.reference or ())
+    return json.dumps(rows)
 
 
 def path_rows(scene: Scene) -> list[list[Any]]:
@@ -172,12 +177,6 @@ def _packed(solids):
     """Return solids in the browser's format: arrays as base64, since they may be long."""
     rows, colours = (b64encode(each).decode() for each in (solids.rows, solids.colours))
     return [solids.shape, rows, colours, solids.opacity, solids.width]
-
-
-def _pose(position: Triple | None, rotation: Rotation) -> list[Any]:
-    if position is None or not all(map(math.isfinite, (*position, *rotation))):
-        return [None, None, None, 0, 0, 0, 1]
-    return _rounded((*position, *rotation))
 
 
 def _rounded(numbers: Iterable[float]) -> list[float]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from nicegui import ui
@@ -41,7 +42,7 @@ LOOKS = ("ground", "flight", "stale", "emergency")
 
 
 class Cards(ValueElement, component="cards.js"):  # type: ignore[call-arg]
-    """A card for each vehicle; the value is a list of what `card` returns."""
+    """A card for each vehicle; the value is a tuple of what `card` returns."""
 
     VALUE_PROP = "vehicles"
 
@@ -81,7 +82,7 @@ class VehiclesPanel:
             "keep their formation. Hold stops them where they are; a mission goes on with its next "
             "command."
         ).classes("hint")
-        self._cards = Cards(value=[])
+        self._cards = Cards(value=())
         self._cards.on("choose", self._choose)
         self._cards.on("act", self._act)
         self._sent: tuple[float, ...] | None = None  # Goal of the last go-to command, m.
@@ -112,10 +113,11 @@ class VehiclesPanel:
             if row.is_open and self._session.past is None
             for name, text in row.left.items()
         }
-        self._cards.value = [
+        # A tuple: NiceGUI would watch each list in a list for changes.
+        self._cards.value = tuple(
             card(each, each.name in names, obstacle, left.get(each.name, ""))
             for each in scene.vehicles.values()
-        ]
+        )
 
     def _allow(self) -> None:
         """Enable the buttons of what can be done now by what is in the fields."""
@@ -262,9 +264,6 @@ def card(
         facts.insert(0, ["position", f"{place} m", "wide"])
     if left:
         facts.insert(0, ["command", left, "wide"])
-    # In the order of the enum, the ordinary ones first; the emergency stands apart.
-    shown = [each for each in Action if each in offered(vehicle)]
-    actions = [each.value for each in sorted(shown, key=lambda each: each is Action.EMERGENCY)]
     return {
         "name": vehicle.name,
         "kind": vehicle.kind.value,
@@ -273,7 +272,7 @@ def card(
         "look": LOOKS[condition(vehicle)],
         "attitude": None if vehicle.position is None else attitude(vehicle),
         "facts": [fact for fact in facts if fact[1]],
-        "actions": actions,
+        "actions": _texts(frozenset(offered(vehicle))),
         "charge": None if vehicle.battery is None else _charge(vehicle.battery),
         "chosen": is_chosen,
         "locked": obstacle,
@@ -291,6 +290,13 @@ def offered(vehicle: VehicleSnapshot, with_moves: bool = False) -> set[Action]:
     # Whether one flies whose state is not known is not known, either.
     is_down = vehicle.state == WORDS[FlightStatus.ON_GROUND]
     return shown - {Action.HOLD, Action.GO_TO, *([Action.LAND] if is_down else [])}
+
+
+@lru_cache
+def _texts(actions: frozenset[Action]) -> list[str]:
+    """Return the texts of buttons, in the order of the enum; the emergency stands apart."""
+    shown = [each.value for each in Action if each in actions - {Action.EMERGENCY}]
+    return shown + [each.value for each in actions & {Action.EMERGENCY}]
 
 
 def _charge(voltage: float) -> float:

@@ -170,7 +170,7 @@ class View:
             return scene
         text = f"what is shown is {age:.0f} s old: the dashboard is held up"
         vehicles = {
-            name: replace(each, is_stale=True, pose_age=each.pose_age and each.pose_age + age)
+            name: each._replace(is_stale=True, pose_age=each.pose_age and each.pose_age + age)
             for name, each in scene.vehicles.items()
         }
         held_up = Sentence("error", "dashboard", text, "look at its log")

@@ -176,12 +176,7 @@ class FleetServicesNode(Node):
         if begun:
             self._handle.error(f"{text}; landing {', '.join(begun)}")
             text = f"{text}; those that had begun have landed"
-        # A vehicle that has not begun refuses to land, too.
-        failures = {
-            name: reason
-            for name, reason in (yield self._lander.land(begun)).items()
-            if self._states.flight_state(name) != FlightStatus.ON_GROUND
-        }
+        failures = yield self._lander.land(begun)
         raise ServiceError(text + (f"; MAY STILL FLY: {self._text(failures)}" if failures else ""))
 
     def _land(self, *_):

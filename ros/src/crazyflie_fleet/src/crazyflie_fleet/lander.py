@@ -57,6 +57,7 @@ class Lander(LandingSide):
         # Vehicles whose landing service has not answered.
         self._calls: set[str] = set()
         self._refusals: dict[str, str] = {}
+        self._stood: list[str] = []  # Vehicles that were to land and stood on the ground already.
         self._answer: Future[Refusals] | None = None  # Of all landings that have not ended.
         self._rounds: Iterator[None] = iter(())
         handle.timer(_PERIOD, self._on_timer)
@@ -94,6 +95,9 @@ class Lander(LandingSide):
         self._publish_left()
         answer, self._answer = self._answer, None
         refusals, self._refusals = self._refusals, {}
+        stood, self._stood = self._stood, []
+        if stood:
+            self._handle.info(f"on the ground already: {', '.join(stood)}")
         if answer is not None:
             answer.set_result(refusals)
 
@@ -172,7 +176,11 @@ class Lander(LandingSide):
 
     def _on_landed(self, name, done):
         self._calls.discard(name)
-        self._note_refusal(name, done)
+        is_down = self._states.flight_state(name) == FlightStatus.ON_GROUND
+        if is_down and done.exception() is not None:
+            self._stood.append(name)
+        else:
+            self._note_refusal(name, done)
 
     def _note_refusal(self, name, done):
         if done.exception() is not None:

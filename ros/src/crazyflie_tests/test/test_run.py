@@ -193,6 +193,12 @@ def test_arguments_are_refused_at_once(words, complaint):
     assert result.stderr.startswith(f"run: {complaint}")
 
 
+def test_the_help_of_a_swarm_is_its_own():
+    """It was that of mission, with a script that swarm does not take."""
+    said = subprocess.run([TOP / "run", "swarm", "--help"], capture_output=True, text=True, check=True)
+    assert said.stdout.startswith("usage: run swarm [n|NAME:=VALUE ...]")
+
+
 def test_words_used_elsewhere_exist():
     usage = subprocess.run([TOP / "run", "help"], capture_output=True, text=True, check=True).stdout
     words = set(re.findall(r"^  (\w+) ", usage, re.MULTILINE))

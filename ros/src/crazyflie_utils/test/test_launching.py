@@ -5,7 +5,7 @@ import contextlib
 import pytest
 import rosgraph
 
-from crazyflie_utils.testing import launching
+from crazyflie_utils.testing import launching, programs
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 
@@ -69,9 +69,11 @@ def test_the_end_of_a_launch_is_waited_for_in_words(tmp_path, monkeypatch):
         yield
         shown.append((text, before, rosgraph.is_master_online()))
 
-    monkeypatch.setattr(launching, "waiting", waiting)
+    for module in (launching, programs):
+        monkeypatch.setattr(module, "waiting", waiting)
     for name in ("ROS_MASTER_URI", "ROS_IP"):
         monkeypatch.setenv(name, "")  # Set by it, and put back after the test.
     with launching.master(tmp_path / "log"):
         pass
-    assert shown[1:] == [("ending what was launched", True, False)]
+    # In one line: two of a terminal took turns ten times a second.
+    assert shown[1:] == [("until rosmaster has ended", True, False)]

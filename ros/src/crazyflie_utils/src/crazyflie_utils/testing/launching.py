@@ -62,8 +62,10 @@ def _with_master(log, program, *arguments):
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"
     command = (program, "-p", port, *arguments)
-    with log.open("w") as output, contextlib.ExitStack() as launch:
-        process = launch.enter_context(running(*command, stdout=output, stderr=subprocess.STDOUT))
+    with (
+        log.open("w") as output,
+        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
         deadline = time.monotonic() + _START_LIMIT
         with waiting("until a ROS master answers"):
             while not rosgraph.is_master_online():
@@ -71,8 +73,4 @@ def _with_master(log, program, *arguments):
                     reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
                     raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
                 time.sleep(0.02)
-        try:
-            yield process
-        finally:
-            with waiting("ending what was launched"):
-                launch.close()
+        yield process

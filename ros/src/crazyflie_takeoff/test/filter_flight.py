@@ -73,7 +73,7 @@ class Supervised:
 
     @flight_state.setter
     def flight_state(self, state):
-        self.facts.flight = state
+        self.facts.hear_flight(self.facts.now, state)
         self.memory.clear_until = -math.inf
 
     def stop(self, reason):

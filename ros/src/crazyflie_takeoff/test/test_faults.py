@@ -244,3 +244,30 @@ def test_takeoff_of_a_vehicle_that_cannot_fly():
     assert "flying" not in states(network)
     assert network.last("/in_flight_status") == "on ground: the vehicle has not lifted off"
     assert set(thrusts(network, network.time - 0.3)) == {0.0}
+
+
+@pytest.mark.parametrize("takeoff", [{"duration/open_loop": 0.0}, {"takeoff/thrust": 9.0}])
+def test_takeoff_after_a_flight_that_the_filter_has_ended(takeoff):
+    """A takeoff without thrust above g was no takeoff for the filter: its motors stayed off."""
+    network = HoverNetwork({**SERVER, **takeoff})
+    network.advance(0.5)
+    network.call("/emergency")
+    network.advance(2.1)
+    network.call("/emergency_reset")
+    network.take_off()
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_takeoff_whose_flight_the_filter_ends_fails():
+    """The clock of a slow simulation: the filter did not pass it on, and the call succeeded."""
+    network = HoverNetwork(SERVER)
+    network.advance(0.5)
+    future = network.call("/takeoff")
+    network.advance(1.1)
+    assert network.last("/in_flight_flight_status") == "taking_off"
+    network.kill("filter")
+    status = filter_status("taking_off", FilterStatus.DOWN, reason="it was too slow")
+    network.publish("/in_flight_filter_status", status, "/filter")
+    network.advance_until(future.done)
+    with pytest.raises(ServiceError, match="ended by the filter: it was too slow"):
+        future.result(0)

@@ -297,3 +297,38 @@ def test_on_a_table_at_launch_with_a_reference():
     assert network.last("/in_flight_flight_status") == "on_ground"
     assert len(network.on("/control/lqr")) > 400
     assert set(thrusts(network, 0.0)) == {0.0}
+
+
+@pytest.mark.parametrize("height", [0.0, 0.7])
+def test_no_takeoff_server_yet_with_a_reference(height):
+    """The filter waits for one: a vehicle at launch rose to its reference, and fell from there."""
+    network = HoverNetwork(SERVER)
+    network.kill("server")
+    network.kill("filter")
+    network.vehicle_node.offset = height
+    reference = PositionVelocityStateStamped()
+    reference.state.z = 1.5
+    network.process("controller").publish("/ref", reference)
+    network.start_filter()
+    network.advance(3.0)
+    assert len(network.on("/control/lqr")) > 200
+    assert network.on("/control/final") == []
+    network.start_server()
+    network.advance(2.0)
+    assert set(thrusts(network, 0.0)) == {0.0}
+    network.take_off()
+
+
+def test_a_filter_that_is_restarted_without_a_server_lifts_nothing():
+    """The controller still has the reference of the last flight."""
+    network = HoverNetwork(SERVER)
+    network.take_off()
+    network.call("/emergency")
+    network.kill("server")
+    network.advance(1.0)
+    network.kill("filter")
+    network.start_filter()
+    begun = network.time
+    network.advance(3.0)
+    assert len(network.on("/control/lqr", begun)) > 200
+    assert network.on("/control/final", begun) == []

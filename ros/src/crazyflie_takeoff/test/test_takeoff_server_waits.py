@@ -8,7 +8,7 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
-from crazyflie_msgs.msg import FilterStatus, VehicleStatus
+from crazyflie_msgs.msg import EstimateStatus, FilterStatus, VehicleStatus
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_takeoff.vehicle_facts import CONNECTION_TIME, MAX_FACT_AGE
 from crazyflie_utils.refusal import ServiceError
@@ -149,6 +149,27 @@ def test_a_stamp_that_is_missing_or_ahead_says_nothing_about_age(ahead):
     assert not call(process, "/takeoff").done()
 
 
+@pytest.mark.parametrize("height", [0.96, 1.5])
+def test_takeoff_to_a_hover_point_that_is_not_above_the_vehicle_is_refused(height):
+    """The vehicle was pressed to its table, and was said to be unable to fly."""
+    process = on_ground(SERVER)
+    process.publish("/state", state(height))
+    words = rf"hover/z is 1 m, and the vehicle is at {height:.2f} m; expected a point above it"
+    with pytest.raises(ServiceError, match=words):
+        call(process, "/takeoff")
+
+
+def test_takeoff_of_a_vehicle_that_has_tilted_over_is_refused():
+    """The filter ended it with an emergency, which had to be reset."""
+    process = on_ground(SERVER)
+    for is_tilted in (True, False):
+        process.publish("/state_status", EstimateStatus(is_tilted=is_tilted))
+        if is_tilted:
+            with pytest.raises(ServiceError, match="the vehicle has tilted over"):
+                call(process, "/takeoff")
+    assert not call(process, "/takeoff").done()
+
+
 def publish_controller(process, has_controller, flight="on_ground"):
     process.publish(
         "/in_flight_filter_status", filter_status(flight, has_controller=has_controller)
@@ -204,6 +225,30 @@ def test_takeoff_does_not_wait_for_ever():
         answer.result(0)
     with pytest.raises(ServiceError, match="no state has come on /state"):
         call(process, "/takeoff")
+
+
+def test_a_landing_ends_a_takeoff_that_waits():
+    """The vehicle is to stay where it is; it took off later."""
+    process = started()
+    answer = call(process, "/takeoff")
+    with pytest.raises(ServiceError, match="the vehicle is on the ground"):
+        call(process, "/land")
+    with pytest.raises(ServiceError, match="takeoff aborted: /land was called"):
+        answer.result(0)
+    process.publish("/state", state(0.0))
+    process.advance(0.1)
+    assert states(process) == ["on_ground"]
+
+
+def test_an_emergency_ends_a_takeoff_that_waits():
+    """It took off after the reset."""
+    process = started()
+    answer = call(process, "/takeoff")
+    emergency = filter_status("on_ground", FilterStatus.EMERGENCY, reason="it was called")
+    process.publish("/in_flight_filter_status", emergency)
+    process.advance(0.1)
+    with pytest.raises(ServiceError, match="emergency, it was called; reset it first"):
+        answer.result(0)
 
 
 def test_landing_needs_neither():

@@ -109,6 +109,7 @@ class Facts:
         self.vehicle = vehicle
         # The flight, as the server says: its state, or the toggles of in_flight before that.
         self.flight: FlightState | None = None
+        self.takeoff_called = -math.inf  #: `ran` when the server began its last takeoff (s).
         self.toggled = False
         #: Whether a server would have told of a flight by now.
         self.has_listened = False
@@ -227,6 +228,13 @@ class Facts:
         return True
 
     # Flight.
+
+    def hear_flight(self, now: float, state: FlightState) -> None:
+        """Record the flight state that the server says."""
+        self.advance(now)
+        if state is FlightState.TAKING_OFF and self.flight is not state:
+            self.takeoff_called = self.ran
+        self.flight = state
 
     @property
     def in_flight(self) -> bool:

@@ -21,6 +21,9 @@ CRASH_DURATION = 0.1  #: Time for which a position is wrong in a crash (s).
 MAX_FAULT_TIME = 2.0
 CLIMB_TIMEOUT = 2.0  #: Time of controls that climb too fast after which the flight is ended (s).
 DESCENT_TIMEOUT = 1.5  #: Longest time that a vehicle which is to land may stay up (s).
+#: Time that a filter listens when it starts, before it passes commanded controls (s): some periods
+#: of the zero thrust on the ground, and less than a vehicle flies on without controls.
+LISTENING_TIME = 0.4
 RESET_DELAY = 2.0  #: Time after an emergency in which a vehicle may still fall (s).
 
 
@@ -133,6 +136,12 @@ def _began_in_flight(facts, memory):
     return (facts.in_flight or is_lifted) and facts.is_commanded and is_checked
 
 
+def _has_listened(facts, memory):
+    # Where no server is, none says whether the vehicle flies; without states it is not waited for.
+    is_there = facts.ran - facts.server_missed > LISTENING_TIME
+    return facts.has_listened and (is_there or not facts.sees)
+
+
 def _touched_down(facts, memory):
     return facts.ground.has_touched_down(facts.seen)
 
@@ -144,7 +153,9 @@ def _descent_is_over(facts, memory):
 
 
 def _lifts_off(facts, memory):
-    return facts.kept.ran > memory.since and facts.kept_thrust > GRAVITY
+    # A server of another kind says it by its thrust alone.
+    is_lifted = facts.kept.ran > memory.since and facts.kept_thrust > GRAVITY
+    return is_lifted or facts.takeoff_called > memory.since
 
 
 _P = Phase
@@ -153,6 +164,7 @@ FLOWN = (_P.PASSING, _P.RETURNING)
 #: The vehicle is in the air, and the supervisor has not decided yet to bring it down.
 HELD = (*FLOWN, _P.HOLDING)
 AIRBORNE = (*HELD, _P.SINKING)
+TILTED = "the vehicle has tilted over"
 LANDS = "{}; the filter lands"
 STAYS_UP = f"the vehicle has not come down for {DESCENT_TIMEOUT:g} s of a landing"
 _ALL_BUT_EMERGENCY = tuple(phase for phase in Phase if phase is not _P.EMERGENCY)
@@ -170,7 +182,7 @@ GUARDS: tuple[Guard, ...] = (
     Guard("emergency", _ALL_BUT_EMERGENCY, lambda f, m: f.emergency, _P.EMERGENCY, "{}"),
     Guard("on the ground", (_P.PASSING,), lambda f, m: f.stands, _P.ON_GROUND),
     Guard("off the ground", (_P.ON_GROUND,), lambda f, m: not f.stands, _P.PASSING),
-    Guard("tipped over", AIRBORNE, _tipped, _P.EMERGENCY, "the vehicle has tilted over"),
+    Guard("tipped over", AIRBORNE, _tipped, _P.EMERGENCY, TILTED),
     Guard("out of bounds", AIRBORNE, _outside, _P.EMERGENCY, "{}", CRASH_DURATION),
     Guard("vehicle cannot fly", AIRBORNE, _vehicle_fault, _P.DOWN, "{}", MAX_FAULT_TIME),
     Guard("two publishers", HELD, lambda f, m: f.contention, _P.SINKING, LANDS),
@@ -192,7 +204,7 @@ GUARDS: tuple[Guard, ...] = (
         "the vehicle was on the ground when the filter began",
     ),
     Guard("began in flight", (_P.LISTENING,), _began_in_flight, _P.PASSING),
-    Guard("has listened", (_P.LISTENING,), lambda f, m: f.has_listened, _P.PASSING),
+    Guard("has listened", (_P.LISTENING,), _has_listened, _P.PASSING),
     Guard("server is there", (_P.LISTENING,), lambda f, m: f.kept.ran >= 0.0, _P.PASSING),
     Guard(
         "no control",

@@ -5,8 +5,8 @@ import math
 from collections.abc import Callable
 
 from crazyflie_takeoff.envelope import Box, hover_complaint
-from crazyflie_takeoff.guards import MAX_FAULT_TIME, Guard
-from crazyflie_takeoff.motion import Measured
+from crazyflie_takeoff.guards import MAX_FAULT_TIME, TILTED, Guard
+from crazyflie_takeoff.motion import TOUCHDOWN_HEIGHT, Measured
 from crazyflie_takeoff.phases import FilterState
 from crazyflie_takeoff.server_parameters import TakeoffServerParameters
 from crazyflie_takeoff.server_table import (
@@ -80,6 +80,7 @@ class TakeoffChecks:
         self.parameters = parameters
         self.box = parameters.box
         self.measured = Measured()
+        self.is_tilted = False
         #: What the driver publishes about the vehicle.
         self.vehicle = VehicleFacts(parameters.connected_topic, resolve)
         self.battery = BatteryCheck(
@@ -122,10 +123,20 @@ class TakeoffChecks:
             or self.vehicle.takeoff_refusal(now)
             or self.positioning
             or (topic and self.measured.explanation(now, self._resolve(topic)))
+            or self._stance_complaint(now)
             or ("" if self.has_controller else _NO_CONTROLLER)
             or self.inhibition
             or self.battery_complaint(now)
         )
+
+    def _stance_complaint(self, now):
+        if self.is_tilted:
+            return TILTED
+        position, z = self.measured.position(now), self.parameters.hover_z
+        if position is None or z - position[2] >= TOUCHDOWN_HEIGHT:
+            return ""
+        at = f"the vehicle is at {position[2]:.2f} m"
+        return f"hover/z is {z:g} m, and {at}; expected a point above it"
 
     def state_complaint(self, now: float) -> str:
         """Return that the state is not known any more, and why; empty if it is, or never was."""

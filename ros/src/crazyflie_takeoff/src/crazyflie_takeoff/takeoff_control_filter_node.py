@@ -22,7 +22,7 @@ from crazyflie_takeoff.envelope import Limits
 from crazyflie_takeoff.facts import Facts, Timeouts
 from crazyflie_takeoff.fallback import SafeSetpoint
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.guards import Memory
+from crazyflie_takeoff.guards import LISTENING_TIME, Memory
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.phases import FilterState, FlightState, Phase, flight_state
 from crazyflie_takeoff.supervisor import Given
@@ -37,9 +37,6 @@ from crazyflie_utils.vectors import stamped
 TIME_STEP = 0.01  #: Period of the filter's own controls (s).
 NOMINAL_TIME_STEP = 0.04  #: Period of the ticks in a nominal flight (s).
 
-#: Time that a filter listens when it starts, before it passes commanded controls (s): some periods
-#: of the zero thrust on the ground, and less than a vehicle flies on without controls.
-LISTENING_TIME = 0.4
 SERVER_LIMIT = 2.0  #: Longest time that it waits for a server that recovers the flight state (s).
 FRESH_TIME = 5.0  #: Time after the start in which commanded controls do not prove a flight (s).
 CONTROLLER_POLL_PERIOD = 0.1  #: Period of the search for publishers of controls (s).
@@ -221,7 +218,7 @@ class TakeoffControlFilterNode(Node):
             )
             return
         if state is not None:
-            self._facts.flight = state
+            self._facts.hear_flight(self._handle.time(), state)
             self._notice()
 
     def _on_toggle(self, _):

@@ -51,6 +51,9 @@ LEAVE_LIMIT = 7.0
 #: controller (s): nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
 
+# States in which the call of a takeoff may be under way.
+_TAKES_OFF = (FlightState.TAKING_OFF, FlightState.FLYING)
+_ENDED = "the flight was ended by the filter: {}"
 # For an operator, both parts of a landing are one.
 _LOG_WORDS = flight_status.WORDS | {FlightStatus.DESCENDING: "landing"}
 
@@ -158,8 +161,7 @@ class TakeoffServerNode(Node):
             self._flight.request(Request.LAND)
         failure = f"{self._handle.name} has failed or is shutting down; see its log"
         self._answer(failure)
-        while self._waiting:
-            self._waiting.pop(0)[1].set_exception(ServiceError(failure))
+        self._fail_waiting(failure)
 
     # Services.
 
@@ -181,6 +183,7 @@ class TakeoffServerNode(Node):
         now, checks = self._handle.time(), self._checks
         may_wait = self._is_starting and checks.may_become_complete(now)
         may_wait = may_wait or checks.vehicle.is_soon_ready(now)
+        may_wait = may_wait and not self._flight.filter.stops
         waiting, self._waiting = self._waiting, []
         for event, future in waiting:
             if event is Request.TAKEOFF and may_wait:
@@ -195,6 +198,8 @@ class TakeoffServerNode(Node):
         name = self._handle.resolve(
             parameters.takeoff_service if takes_off else parameters.land_service
         )
+        if not takes_off:
+            self._fail_waiting(f"takeoff aborted: {name} was called")
         try:
             is_next = takes_off and self._flight.accepts(event)
             if is_next and (reason := self._takeoff_refusal()):
@@ -217,6 +222,10 @@ class TakeoffServerNode(Node):
             self._under_way.set_exception(ServiceError(failure))
         else:
             self._under_way.set_result(None)
+
+    def _fail_waiting(self, failure):
+        while self._waiting:
+            self._waiting.pop(0)[1].set_exception(ServiceError(failure))
 
     def _end_start(self):
         self._start_timer.stop()
@@ -244,8 +253,9 @@ class TakeoffServerNode(Node):
         before, flight = self._flight.flight_state, self._flight
         if (flight.set_filter(report) or flight.yields) and report.takes_over:
             self._reason = refusal or message.reason
-            if report.stops or before is FlightState.TAKING_OFF:
-                self._answer(f"the flight was ended by the filter: {self._reason}")
+            # In flight, a call that is under way is that of the takeoff.
+            if report.stops or before in _TAKES_OFF:
+                self._answer(_ENDED.format(self._reason))
         self._set_pace()
 
     def _on_inhibition(self, message):
@@ -265,6 +275,7 @@ class TakeoffServerNode(Node):
 
     def _on_estimate_status(self, message):
         self._checks.measured.missing_reason = message.reason
+        self._checks.is_tilted = message.is_tilted
 
     def _measured_position(self):
         return self._checks.measured.position(self._handle.time())
@@ -323,6 +334,9 @@ class TakeoffServerNode(Node):
         if before is FlightState.TAKING_OFF and state is FlightState.LANDING:
             self._reason = "the vehicle has not lifted off"
             self._answer(f"takeoff aborted: {self._reason}; can it fly?")
+        elif before in _TAKES_OFF and state is FlightState.ON_GROUND:
+            self._reason = self._flight.filter.reason
+            self._answer(_ENDED.format(self._reason))
         if state is not None and state is not self._state:
             self._publish_state(state)
         if output.toggle:

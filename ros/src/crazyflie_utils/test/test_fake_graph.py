@@ -151,3 +151,23 @@ def test_the_outside_calls_and_publishes(graph, listener):
 def test_a_node_that_cannot_be_initialized_is_named(graph):
     with pytest.raises(RuntimeError, match=r"/bad was not initialized.*broken by design"):
         graph.start("/bad", Unusable())
+
+
+def test_recorders_are_told_of_every_change(graph, listener):
+    """They look at who publishes and listens only then."""
+    seen = [graph.changes()]
+
+    def has_changed():
+        seen.append(graph.changes())
+        return seen[-1] not in seen[:-1]
+
+    graph.advance(1.0)
+    assert not has_changed()
+    listener.subscriber.close()
+    assert has_changed()
+    graph.listen("/numbers", print)
+    assert has_changed()
+    graph.kill("/talker")
+    assert has_changed()
+    graph.start("/talker", Talker())
+    assert has_changed()

@@ -52,6 +52,7 @@ class _Subscription(ExternalSubscriber):
 
     def close(self) -> None:
         self._transport.subscribers[self._topic].remove(self._deliver)
+        self._transport.changes += 1
 
 
 class OfflineTransport(Transport):
@@ -74,6 +75,8 @@ class OfflineTransport(Transport):
         self.publisher_types: dict[str, Any] = {}
         self.subscriber_types: dict[str, Any] = {}
         self.unpublished: set[str] = set()
+        #: How often a publisher or a subscription has come, or a subscription gone.
+        self.changes = 0
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
         self.service_types: dict[str, type] = {}
         self.log_records: list[tuple[str, str]] = []
@@ -122,6 +125,7 @@ class OfflineTransport(Transport):
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Return a publisher that keeps the messages."""
+        self.changes += 1
         self.publisher_types[topic] = message_type
         return self.publishers.setdefault(topic, _Publication(self, topic))
 
@@ -129,6 +133,7 @@ class OfflineTransport(Transport):
         self, topic: str, message_type: type, deliver: Receiver, may_wait: Condition = never
     ) -> ExternalSubscriber:
         """Keep the function to which `deliver` gives messages."""
+        self.changes += 1
         self.subscriber_types[topic] = message_type
         self.subscribers.setdefault(topic, []).append(deliver)
         return _Subscription(self, topic, deliver)

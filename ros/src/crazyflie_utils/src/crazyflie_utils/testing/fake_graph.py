@@ -51,6 +51,8 @@ class FakeGraph:
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Receiver]] = {}
+        # Those of the graph and of processes that have ended.
+        self._changes = 0
 
     # The processes.
 
@@ -66,6 +68,7 @@ class FakeGraph:
     def kill(self, name: str) -> None:
         """Kill a process as SIGKILL does: it sends nothing more."""
         process = self._processes.pop(name)
+        self._changes += process.transport.changes + 1
         if process.recorder is not None:
             process.recorder.close()
 
@@ -132,6 +135,7 @@ class FakeGraph:
     def listen(self, topic: str, callback: Receiver) -> None:
         """Call ``callback(message)`` with each message published on a topic, without its faults."""
         self._listeners.setdefault(topic, []).append(callback)
+        self._changes += 1
 
     def services(self) -> dict[str, type]:
         """Return the services of all processes that are alive, name -> type."""
@@ -169,6 +173,11 @@ class FakeGraph:
                 process.set_clocks(time)
 
     # Data of the transports.
+
+    def changes(self) -> int:
+        """Return how often anybody has begun, or ended, to publish or to receive a topic."""
+        processes = self._processes.values()
+        return sum((each.transport.changes for each in processes), self._changes)
 
     def publishes(self, topic: str, excluding: str) -> bool:
         """Return whether another process than ``excluding`` publishes a topic."""
@@ -251,6 +260,7 @@ class _Publication(ExternalPublisher):
 
     def close(self) -> None:
         self._transport.advertised.remove(self._topic)
+        self._transport.changes += 1
 
 
 class _GraphTransport(FakeTransport):
@@ -266,6 +276,7 @@ class _GraphTransport(FakeTransport):
         self.latched: dict[str, Any] = {}  #: Message that is latched on each topic.
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
+        self.changes += 1
         self.advertised.append(topic)
         return _Publication(self, topic, latch)
 
@@ -276,6 +287,9 @@ class _GraphTransport(FakeTransport):
         for message in self.graph.latched(topic, self.name):
             deliver(message)
         return subscription
+
+    def peer_changes(self) -> int:
+        return self.graph.changes()
 
     def is_published(self, topic: str) -> bool:
         return self.graph.publishes(topic, self.name)

@@ -43,7 +43,7 @@ numpydoc_show_class_members = False
 
 _GITHUB = [os.environ.get(f"GITHUB_{name}") for name in ("SERVER_URL", "REPOSITORY", "SHA")]
 SOURCES = "{}/{}/blob/{}".format(*_GITHUB) if all(_GITHUB) else TOP.as_uri()
-"""Links to files that are no pages lead here."""
+"""Links to files that are not pages lead here."""
 
 _PLACEHOLDER = "https://sources.invalid"
 """Of SOURCES in Markdown, whose parser refuses file: URLs."""

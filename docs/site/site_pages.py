@@ -13,7 +13,7 @@ _SHAPES = {"[/": "box", "([": "ellipse", "{{": "hexagon"}
 
 
 def link_sources(text: str, page: Path, top: Path, sources: str) -> str:
-    """Return a page whose links to files that are no pages lead to the repository.
+    """Return a page whose links to files that are not pages lead to the repository.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ def test_velocity_and_age_follow_from_stamps(frames, clock):
     send(frames, StampedPose("world", "cf1", 10_050_000_000, (0.1, 0.0, 0.2), LEVEL))
     assert frames.poses["cf1"].velocity == pytest.approx((1.0, 0.0, 2.0))
     clock.now += 2.0
-    # The same stamp again is no new pose.
+    # The same stamp again is not a new pose.
     send(frames, StampedPose("world", "cf1", 10_050_000_000, (0.1, 0.0, 0.2), LEVEL))
     assert frames.age("cf1") == pytest.approx(2.05)
 

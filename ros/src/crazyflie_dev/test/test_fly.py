@@ -68,7 +68,7 @@ def test_files_and_folders_are_those_of_the_terminal(tmp_path, monkeypatch):
     (tmp_path / "lab.yaml").write_text("robots:\n  left: {initial_position: [0, 0, 0]}\n")
     found = vehicles_and_arguments(["fleet:=lab.yaml", "folders:=.:/tmp"], 3)
     assert found == (["left"], [f"fleet:={tmp_path}/lab.yaml", f"folders:={tmp_path}:/tmp"])
-    with pytest.raises(argparse.ArgumentTypeError, match="none is no folder"):
+    with pytest.raises(argparse.ArgumentTypeError, match="none is not a folder"):
         vehicles_and_arguments(["folders:=none"], 3)
 
 

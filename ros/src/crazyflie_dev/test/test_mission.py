@@ -17,8 +17,8 @@ def test_vehicles_are_those_that_the_script_names(script, n):
     [
         (["none.py"], "none.py: No such file"),
         (["README.md"], "README.md: expected a mission script, FILE.py"),
-        (["broken.py"], "broken.py is no Python script: invalid syntax"),
-        (["data.py"], "data.py is no Python script: "),
+        (["broken.py"], "broken.py is not a Python script: invalid syntax"),
+        (["data.py"], "data.py is not a Python script: "),
         ([__file__, "0"], "n is 0; expected one number of vehicles"),
         ([__file__, "2", "3"], "n is 2 3; expected one number"),
         ([__file__, "two"], "n is two; expected one number"),

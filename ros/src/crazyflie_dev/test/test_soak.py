@@ -78,7 +78,7 @@ def test_every_live_parameter_is_changed():
 def test_faults_of_poses_arrive():
     names = {
         "poses are not finite",
-        "quaternions are no rotations",
+        "quaternions are not rotations",
         "poses jump",
         "stamps are 3 s old",
         "stamps are 8 s ahead",

@@ -190,7 +190,7 @@ def test_simulated_vehicles_need_no_address(load):
         (
             TWO + "all: {firmware_params: {health: {startPropTest: 1}}}\n",
             ":8: all/firmware_params/health/startPropTest turns motors, arms, stops or restarts "
-            "the vehicle, and is no setting; expected none",
+            "the vehicle, and is not a setting; expected none",
         ),
         (
             TWO + "    firmware_params: {motorPowerSet: {enable: 1}}\n",

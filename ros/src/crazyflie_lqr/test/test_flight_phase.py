@@ -15,7 +15,7 @@ def test_who_does_not_lift_off_stands():
     assert guess.is_flying(0.2, 1.0, 10.0)
     assert guess.is_flying(0.2, 1.0, 12.9)
     assert not guess.is_flying(0.2, 1.0, 13.1)
-    # The same goal over and over is no new one.
+    # The same goal over and over is not a new one.
     assert not guess.is_flying(0.21, 1.01, 20.0)
     assert guess.is_flying(0.2, 0.8, 30.0)
     assert not guess.is_flying(0.2, 0.8, 34.0)
@@ -34,6 +34,6 @@ def test_what_has_lifted_off_is_5_cm_above_the_lowest_height():
     guess.is_flying(0.125, 1.0, 1.0)
     assert not guess.is_flying(0.17, 1.0, 3.0)
     assert guess.is_flying(0.18, 1.0, 3.0)
-    # 4 cm are no new height of the reference, 6 cm are.
+    # 4 cm are not a new height of the reference, 6 cm are.
     assert not guess.is_flying(0.125, 1.04, 10.0)
     assert guess.is_flying(0.125, 1.06, 10.0)

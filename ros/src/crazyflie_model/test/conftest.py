@@ -1,4 +1,4 @@
-"""Settings of the property tests: a busy computer is no failure."""
+"""Settings of the property tests: a busy computer is not a failure."""
 
 from hypothesis import settings
 

@@ -1,4 +1,4 @@
-"""Bags that break off, that are no bags, and those that are too long for memory."""
+"""Bags that break off, that are not bags, and those that are too long for memory."""
 
 import struct
 

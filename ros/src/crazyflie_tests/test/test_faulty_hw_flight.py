@@ -20,7 +20,7 @@ the motors, and 0.7 s of fall from 2.5 m. The rest is for a machine that is too 
 virtual vehicle loses time."""
 
 BACK = 10.0
-"""After a restart the link is lost after 0.45 s, kept for 1 s, and set up anew, s."""
+"""After a restart the link is lost after 0.45 s, kept for 1 s, and set up again, s."""
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ def releases(text, name):
     AssertionError
         It does not have the form of REP 132.
     SystemMessage
-        It is no reStructuredText.
+        It is not reStructuredText.
     """
     strict = {"doctitle_xform": False, "halt_level": 2, "report_level": 5}
     (document,) = publish_doctree(text, settings_overrides=strict).children

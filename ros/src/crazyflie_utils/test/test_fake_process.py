@@ -155,7 +155,7 @@ def test_a_late_answer_comes_before_the_limit(process):
 
 
 def test_time_never_steps_back(process):
-    """A deadline just past the end by a rounding error is no reset of the simulation."""
+    """A deadline just past the end by a rounding error is not a reset of the simulation."""
     times = []
     process.clock.on_change(lambda time, is_reset: times.append((time, is_reset)))
     process.handle("/node").timer(0.01, lambda: None)

@@ -208,7 +208,7 @@ class DigitsNode(Node):
 
 
 def test_nodes_are_given_the_digits_that_are_written(path):
-    """Those of a float32 are fewer; a bool on the wire is no number."""
+    """Those of a float32 are fewer; a bool on the wire is not a number."""
     recorder = Recorder(JournalWriter(path, HEADER, 1e9, print))
     process = FakeProcess(recorder=recorder)
     assert process.launch(DigitsNode(), "/digits")

@@ -149,7 +149,7 @@ class Scene:
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
     solids: tuple[Placed[Solids], ...] = ()
     fences: tuple[Placed[Box], ...] = ()  #: Geofences.
-    #: Names of frames of /tf that are no vehicles, such as rigid bodies of motion capture.
+    #: Names of frames of /tf that are not vehicles, such as rigid bodies of motion capture.
     frames: tuple[Placed[str], ...] = ()
     #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from crazyflie_utils import NodeHandle
 
 _MARKERS = ("world/markers", "sweep/markers", "plan/markers")  #: Last names of topics with markers.
 _WORLD = "world/markers"  #: Last name of the topic with the objects of a world file.
-_LOWEST_ROOM = 1.0  #: Height of objects below which they are no walls of a room (m).
+_LOWEST_ROOM = 1.0  #: Height of objects below which they are not walls of a room (m).
 _FENCES = "geofence/parameter_updates"  #: Last name of a geofence's live parameters.
 _PATH = "nav_msgs/Path"
 _HELD = "fleet/waiting"  #: Last name of the topic with vehicles that a fleet holds apart.

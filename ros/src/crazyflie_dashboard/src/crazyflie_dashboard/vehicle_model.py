@@ -183,7 +183,7 @@ class VehicleModel:
     def _note(self, role, content):
         self._newest[role] = content
         self.__dict__.pop("_reported", None)
-        # A voltage that was known stays until there is another one; 0 V is no measurement.
+        # A voltage that was known stays until there is another one; 0 V is not a measurement.
         if role == "vehicle_status" and _known(content.battery_voltage):
             self._newest["battery"] = (content.battery_voltage,)
         self._arrivals[role] = self._time()

@@ -54,7 +54,8 @@ def vehicles_and_arguments(words: Sequence[str], default: int) -> tuple[list[str
             if name == "fleet" and paths:
                 names = [vehicle.name for vehicle in fleet_file.load(paths[0]).vehicles]
             elif name == "folders":
-                problems += [f"folders: {path} is no folder" for path in paths if not path.is_dir()]
+                missing = [path for path in paths if not path.is_dir()]
+                problems += [f"folders: {path} is not a folder" for path in missing]
             else:
                 continue
             others[place] = f"{name}:={':'.join(map(str, paths))}"

@@ -42,7 +42,7 @@ def checked(script: Path) -> str:
     except OSError as error:
         raise argparse.ArgumentTypeError(f"{script}: {error.strerror}") from None
     except (SyntaxError, ValueError) as error:
-        raise argparse.ArgumentTypeError(f"{script} is no Python script: {error}") from None
+        raise argparse.ArgumentTypeError(f"{script} is not a Python script: {error}") from None
     return text
 
 

@@ -477,7 +477,7 @@ FAULTS = [
     _blind("poses stop", on_tf(lambda *_: []), 0.7, 9.0),
     Fault("every second pose is lost", on_tf(_dropout), 1.0, 5.0),
     _blind("poses are not finite", with_each(_nan), 0.3, 4.0),
-    _blind("quaternions are no rotations", with_each(_flat_quaternion), 0.3, 4.0),
+    _blind("quaternions are not rotations", with_each(_flat_quaternion), 0.3, 4.0),
     _blind("poses jump", with_each(_jump), 0.3, 4.0),
     _blind("stamps are 3 s old", _shift(-3.0), 0.3, 4.0),
     _blind("stamps are 8 s ahead", _shift(8.0), 0.3, 4.0),

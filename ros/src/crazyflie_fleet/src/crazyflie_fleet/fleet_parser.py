@@ -280,7 +280,7 @@ class FleetParser:
                 for key, value in inner.entries().items():
                     if acts(f"{group}.{key}"):
                         # Values are written whenever the vehicle is added, also in a hand.
-                        text = "turns motors, arms, stops or restarts the vehicle, and is no "
+                        text = "turns motors, arms, stops or restarts the vehicle, and is not a "
                         self._error(value, text + "setting; expected none")
                     number = self._check_type(FIRMWARE_NUMBER, value.value, value)
                     layer.firmware_params[f"{group}.{key}"] = number

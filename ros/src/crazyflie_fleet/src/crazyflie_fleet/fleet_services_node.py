@@ -89,7 +89,7 @@ class FleetServicesNode(Node):
         tick.set_result(None)
 
     def _begin(self, steps, *arguments):
-        """Begin the steps of a service; an error that is no refusal is a fault of this node."""
+        """Begin the steps of a service; an error that is not a refusal is a fault of this node."""
 
         def guarded():
             try:

@@ -1,4 +1,4 @@
-"""Gains for a vehicle with a model: as quick as its delay and its lags allow."""
+"""Gains for a vehicle with a model: as fast as its delay and its lags allow."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -157,7 +157,7 @@ class GroupState:
         return trajectory.duration(within_limits(pieces, self.rules.limits))
 
     def warn(self, text: str) -> None:
-        """Report what a dry run has found that is no error."""
+        """Report what a dry run has found that is not an error."""
         self.observer.warn(text)
 
     def _timed(self, name, pieces, begin):

@@ -28,7 +28,7 @@ class MissionObserver:
         """Process a time step of a dry run; ``group`` is its `DryRun`."""
 
     def warn(self, text: str) -> None:
-        """Process what a dry run has found that is no error."""
+        """Process what a dry run has found that is not an error."""
 
     def passed(self, vehicles: list[str], duration: float) -> None:
         """Process the end of a dry run by `Fleet.fly`, which took a duration (s)."""

@@ -180,7 +180,7 @@ def of_journals(paths: list[Path]) -> FlightInput:
     """Return what the processes of journals were given, and what they published.
 
     The latter is found by running their nodes again; what they publish after something that today's
-    nodes do otherwise is not known. `JournalError`: one is no journal.
+    nodes do otherwise is not known. `JournalError`: one is not a journal.
     """
     found = FlightInput([], {}, {})
     series: dict[str, list[Given]] = {}

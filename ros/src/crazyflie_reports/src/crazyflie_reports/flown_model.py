@@ -119,7 +119,7 @@ def explain(model: VehicleModel, vehicle: Vehicle, start: float, end: float) -> 
         x[:6], x[at] = [*position[k].tolist(), *velocity[k].tolist()], float(yaw[k])
         states[k] = x
         u = controls[k].tolist()
-        # Above the ground, which is no part of the air.
+        # Above the ground, which is not part of the air.
         x[2] = max(x[2], 1.0)
         x = dynamics.steps(_STEPS, k * _STEPS, x, u)
         accelerations[k] = (np.array(x[3:6]) - velocity[k]) / PERIOD

@@ -86,7 +86,7 @@ def replay(
         return Outcome(Status.DIFFERENT, f"{path}: different before its nodes are made: {error}")
     except EndError:
         return Outcome(Status.NOT_RUN, f"{path}: it ends before its nodes are made")
-    # What the program has imported is no garbage of the nodes.
+    # What the program has imported is not garbage of the nodes.
     gc.collect()
     gc.freeze()
     if not has_profile:

@@ -110,7 +110,7 @@ class Result:
 
 
 def _shown(value):
-    # A rounding error is no length.
+    # A rounding error is not a length.
     return "–" if math.isnan(value) else f"{0.0 if abs(value) < _NOTHING else value:.4g}"
 
 

@@ -68,7 +68,7 @@ def test_many_vehicles_and_one_that_is_stuck(server):
     ("uri", "text"),
     [
         ("radio://0/25/2M/E7E7E7E701", "no Crazyradio dongle found.*udev"),
-        ("radio://0/25", "is no address of a vehicle: expected radio://"),
+        ("radio://0/25", "is not an address of a vehicle: expected radio://"),
         ("udp://127.0.0.1:1", "nothing listens on this port"),
     ],
 )

@@ -254,7 +254,7 @@ def test_parameters_that_cannot_be_written_do_not_stop_the_others(server):
         "ring.effect is a uint8_t; 1000 does not fit",
         "no parameter 'no.such'",
         "parameter /cf1/not/set is not set",
-        "'nonsense' is no firmware parameter; expected GROUP/NAME",
+        "'nonsense' is not a firmware parameter; expected GROUP/NAME",
         "cpu.id0 can only be read",
     ):
         assert text in str(caught.value)

@@ -86,9 +86,9 @@ def test_stored_parameters(virtual):
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("ring/solidRed", "ring.solidRed is no persistent parameter"),
+        ("ring/solidRed", "ring.solidRed is not a persistent parameter"),
         ("ring/none", "no parameter 'ring.none'"),
-        ("effect", "'effect' is no firmware parameter; expected GROUP/NAME"),
+        ("effect", "'effect' is not a firmware parameter; expected GROUP/NAME"),
     ],
 )
 def test_what_cannot_be_stored(virtual, name, text):

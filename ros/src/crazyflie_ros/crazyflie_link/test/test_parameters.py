@@ -76,7 +76,7 @@ def test_what_is_stored_of_a_parameter(vehicle, link):
         vehicle.answers[where] = answer
         with pytest.raises(RefusedError, match=f"reading the state of pid_rate.roll_kp: .*{text}"):
             read("pid_rate.roll_kp")
-    with pytest.raises(RefusedError, match="ring.effect: it is no persistent parameter"):
+    with pytest.raises(RefusedError, match="ring.effect: it is not a persistent parameter"):
         read("ring.effect")
 
 

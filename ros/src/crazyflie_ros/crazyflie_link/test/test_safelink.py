@@ -95,7 +95,7 @@ def test_a_link_that_comes_back_is_not_deaf(bus, vehicle, states):
 
 
 def test_a_chip_without_safelink_is_connected_all_the_same(bus, vehicle, make_link, monkeypatch):
-    """Other firmware: the request is no packet that it answers."""
+    """Other firmware: the request is not a packet that it answers."""
     chip = bus.dongle.chips[PLACE]
     exchange = chip.exchange
     monkeypatch.setattr(

@@ -130,7 +130,7 @@ def test_memories(target, flying):
     link = flying.link()
     with pytest.raises(RefusedError, match="no memory for base stations: update its firmware"):
         find_memory(link, MemoryElement.TYPE_LH, "base stations")
-    # A reply without a status is no refusal.
+    # A reply without a status is not a refusal.
     target.answers[4, 2, 1] = struct.pack("<BI", 1, 0)
     write_memory(link, 1, 0, b"data", "a test")
     assert only_packet(target, 4, 2) == struct.pack("<BI", 1, 0) + b"data"

@@ -13,7 +13,7 @@ from crazyflie_state_estimator.control_response import Departure, ResponseMonito
 
 
 class Verdict(Enum):
-    """What a pose is worth."""
+    """Whether a pose can be used, and why not."""
 
     GOOD = "good"
     MOVED = "moved"  #: Good, but the vehicle was moved without flying: filters restart.

@@ -103,8 +103,8 @@ class SafeControl:
     def advance(self, step: float, measured: Motion | None, sinks: bool) -> SafeSetpoint:
         """Return the next control, ``step`` s after the last one.
 
-        ``measured`` is the latest motion; the same object again is no new measurement. ``sinks`` is
-        whether the vehicle is to come down.
+        ``measured`` is the latest motion; the same object again is not a new measurement. ``sinks``
+        is whether the vehicle is to come down.
         """
         self._reckon(step)
         offset = self._offset(measured)

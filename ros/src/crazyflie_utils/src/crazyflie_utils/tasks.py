@@ -58,6 +58,6 @@ class Tasks:
         self._own.number = number
 
     def _end_turn(self):
-        # What follows is no part of the task.
+        # What follows is not part of the task.
         self._own.number = None
         self._executor.end_turn()

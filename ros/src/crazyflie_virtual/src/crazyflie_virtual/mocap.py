@@ -107,7 +107,7 @@ class MocapSettings(Parameters):
     )
     single_markers: str = parameter(
         Text(may_be_empty=True),
-        "vehicles that have one marker and are no rigid bodies: numbers with commas, or all",
+        "vehicles that have one marker and are not rigid bodies: numbers with commas, or all",
         "",
     )
 
@@ -115,7 +115,7 @@ class MocapSettings(Parameters):
 class MocapScene:
     """Rigid bodies at their last observation.
 
-    Vehicles with one marker are no rigid bodies.
+    Vehicles with one marker are not rigid bodies.
     """
 
     def __init__(self, settings: MocapSettings):

@@ -35,7 +35,7 @@ class Body(Parameters):
     child_frame_id: str | None = parameter(FRAME, "tf frame of the body", None)
     parent_frame_id: str = parameter(FRAME, "tf frame of the coordinates", "world")
     key: str = ""  #: Key of the entry.
-    unknown: tuple[str, ...] = ()  #: Names in the entry that are no parameters.
+    unknown: tuple[str, ...] = ()  #: Names in the entry that are not parameters.
 
     kind: ClassVar = "rigid body"  #: What it is, in messages.
     dictionary: ClassVar = "rigid_bodies"  #: Where its entry is.

@@ -164,7 +164,7 @@ class NatNetSource(Source):
         while (now := time.monotonic()) < end:
             if self._is_due(natnet.CONNECT, _ASK_AGAIN):
                 self._send_connect(targets)
-            # Datagrams that are no answer do not put off the next request.
+            # Datagrams that are not an answer do not put off the next request.
             until = min(end, self._done_at[natnet.CONNECT] + _ASK_AGAIN)
             if info := self._receive([self._commands], until - now, self._take_answer):
                 return info

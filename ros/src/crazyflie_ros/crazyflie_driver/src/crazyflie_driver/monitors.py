@@ -229,7 +229,7 @@ class Touchdown:
     """The end of a landing at a height (m), in a duration (s) from ``now`` (s) on.
 
     The height of the ground is not known: a vehicle may have started from a table, or the origin of
-    its estimate may be one. Therefore a height is no touchdown: a vehicle is down when it has
+    its estimate may be one. Therefore a height is not a touchdown: a vehicle is down when it has
     stopped sinking although it is commanded to sink.
     """
 

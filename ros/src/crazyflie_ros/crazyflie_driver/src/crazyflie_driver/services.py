@@ -179,7 +179,7 @@ def parsed_name(name: str) -> str:
     """Return GROUP.NAME of a firmware parameter that a caller names; or raise `ParameterError`."""
     group, _, parameter = name.strip("/").replace(".", "/").partition("/")
     if not group or not parameter:
-        raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
+        raise ParameterError(f"{name!r} is not a firmware parameter; expected GROUP/NAME")
     return f"{group}.{parameter}"
 
 

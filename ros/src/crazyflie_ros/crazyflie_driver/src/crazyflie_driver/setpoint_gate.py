@@ -159,7 +159,7 @@ class SetpointGate:
         self._stopped_since = now
 
     def refusal_of_repetition(self, now: float) -> str:
-        """Return the `refusal` of a setpoint of the driver's own: it is no part of a stream."""
+        """Return the `refusal` of a setpoint of the driver's own: it is not part of a stream."""
         return self._reason(now, False)
 
     def is_blocking(self, now: float) -> bool:

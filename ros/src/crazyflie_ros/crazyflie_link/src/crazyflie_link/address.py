@@ -61,7 +61,7 @@ class Address:
         scheme = text.partition("://")[0]
         match = _FORMS[scheme].fullmatch(text) if scheme in _FORMS else None
         if match is None:
-            raise AddressError(f"{text!r} is no address of a vehicle: expected {EXPECTED}")
+            raise AddressError(f"{text!r} is not an address of a vehicle: expected {EXPECTED}")
         parts = match.groupdict("")
         if scheme == "radio":
             if int(parts["channel"]) > _HIGHEST_CHANNEL:
@@ -87,7 +87,7 @@ def radio_address(text: str) -> int:
     """Return the radio address in a text; `AddressError` without up to 10 hexadecimal digits."""
     digits = text.lower().removeprefix("0x")
     if not re.fullmatch("[0-9a-f]{1,10}", digits):
-        raise AddressError(f"{text!r} is no radio address: expected up to 10 hexadecimal digits")
+        raise AddressError(f"{text!r} is not a radio address: expected up to 10 hexadecimal digits")
     return int(digits, 16)
 
 

@@ -95,7 +95,7 @@ class FirmwareParameters(Subsystem):
     def check_persistent(self, name: str) -> None:
         """Raise `CrazyflieError` unless a parameter exists and can be stored on the vehicle."""
         if not self._find(self._current_link(), name).is_persistent():
-            raise RefusedError(f"{name} is no persistent parameter")
+            raise RefusedError(f"{name} is not a persistent parameter")
 
     def store(self, name: str) -> None:
         """Store the present value of a persistent parameter, to survive a restart; blocks."""
@@ -121,7 +121,7 @@ class FirmwareParameters(Subsystem):
         link = self._current_link()
         element = self._find(link, name)
         if not element.is_persistent():
-            raise RefusedError(f"{verb} {name}: it is no persistent parameter")
+            raise RefusedError(f"{verb} {name}: it is not a persistent parameter")
         data = struct.pack("<BH", command, element.ident)
         answer = link.request(data, Request(CRTPPort.PARAM, MISC_CHANNEL, data, f"{verb} {name}"))
         if len(answer) < 4:

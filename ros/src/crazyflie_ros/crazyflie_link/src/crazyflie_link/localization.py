@@ -137,7 +137,7 @@ class Localization(Subsystem):
         check_finite("external pose", *position, *quaternion)
         norm = math.hypot(*quaternion)
         if norm < 1e-6:
-            raise ValueRangeError("external pose: the quaternion (0, 0, 0, 0) is no attitude")
+            raise ValueRangeError("external pose: the quaternion (0, 0, 0, 0) is not an attitude")
         unit = [component / norm for component in quaternion]
         link = self._current_link()
         if not self._pack(position, unit):

@@ -70,7 +70,9 @@ class Setpoints(Subsystem):
                     "rad/s)"
                 )
         if math.hypot(*quaternion) < 1e-6:
-            raise ValueRangeError("full-state setpoint: the quaternion (0, 0, 0, 0) is no attitude")
+            raise ValueRangeError(
+                "full-state setpoint: the quaternion (0, 0, 0, 0) is not an attitude"
+            )
         self._stream(
             lambda c: c.send_full_state_setpoint(
                 position, velocity, acceleration, quaternion, *rates

@@ -16,7 +16,7 @@ def acts(name: str) -> bool:
 def is_trigger(name: str) -> bool:
     """Return whether a parameter, such as "kalman.resetEstimation", triggers an action.
 
-    It is no state that a vehicle has lost when it was off: it must not be written again.
+    It is not a state that a vehicle has lost when it was off: it must not be written again.
     """
     forgets = _FORGETTING_WORD in name.partition(".")[2].lower() or name in _FORGETTING
     return forgets or acts(name)

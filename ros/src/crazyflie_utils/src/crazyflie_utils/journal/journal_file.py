@@ -328,7 +328,7 @@ class JournalWriter:
             self._drop()
 
     def _drop(self):
-        """Write the file anew without the oldest chunks, those of the start excepted."""
+        """Write the file again without the oldest chunks, those of the start excepted."""
         newest = self._kept[-1][0]
         first = next(place for time, place in self._kept if time >= newest - self._keep)
         new = self.path.with_name(self.path.name + ".new")

@@ -381,7 +381,7 @@ class Replay:
         if (isinstance(make, type) and issubclass(make, Node)) or NodeHandle in hints.values():
             return make
         raise JournalError(
-            f"{self.journal.path}: {shown} is no node; expected a class derived from Node, or a "
+            f"{self.journal.path}: {shown} is not a node; expected a class derived from Node, or a "
             "function of a NodeHandle"
         )
 

@@ -26,7 +26,7 @@ def load(name: str) -> QuadrotorParameters:
             f"the model {name} does not exist{reason}; expected one of {', '.join(TYPES)}, or a "
             "model file, NAME.yaml"
         )
-    # Imported here, since most vehicles are of a type: readers of YAML files are no part of a node.
+    # Imported here, since most vehicles are of a type: most nodes need no reader of YAML files.
     from crazyflie_utils.parameters import model_file
 
     return model_file.load(name)

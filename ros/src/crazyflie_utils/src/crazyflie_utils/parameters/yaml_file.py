@@ -81,7 +81,7 @@ class _Loader(yaml.SafeLoader):
 
 
 def _key(pair):
-    # Keys that are no texts or numbers are refused later.
+    # Keys that are not texts or numbers are refused later.
     return pair[0].value if isinstance(pair[0], yaml.ScalarNode) else id(pair[0])
 
 

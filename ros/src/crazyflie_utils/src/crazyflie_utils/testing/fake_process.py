@@ -34,7 +34,7 @@ class FakeProcess(OfflineProcess):
     ):
         fake = transport or FakeTransport(parameters or {})
         super().__init__(fake, start, recorder)
-        # The timeouts of calls are no timers of the process.
+        # The timeouts of calls are not timers of the process.
         apart = Executor()
         apart.start()
         timers = fake.machine_timers = TimerQueue(apart, self.machine_clock)

@@ -72,7 +72,7 @@ class Estimator:
 
     @property
     def kind(self) -> int:
-        """`COMPLEMENTARY` or `KALMAN`; another one begins anew."""
+        """`COMPLEMENTARY` or `KALMAN`; another one starts from its reset."""
         return self._kind
 
     @kind.setter

@@ -95,6 +95,6 @@ def find(image: NDArray[Any], bounds: ColourBounds, smallest_area: float) -> Tar
         Blue, green, red.
     bounds : ColourBounds
     smallest_area : float
-        Area below which a thing is no target (pixels).
+        Area below which a thing is not a target (pixels).
     """
     raise NotImplementedError("step 3")

@@ -213,8 +213,9 @@ class GraphModel:
         roots = [frames.root(str(frame)) for frame in own or frames.poses]
         fixed = max(sorted(set(roots)), key=roots.count, default="world")
         wrong = {each.name: each.message for each in self._diagnostics.wrong()}
+        held = self._surroundings.held
         for name, model in self.models.items():
-            model.now = self._snapshot(name, fixed, wrong)
+            model.now = self._snapshot(name, fixed, wrong, held)
             if model.plots is not None:
                 model.plots.take_pose(model.now, "state" in model.vehicle.topics)
         (running, steps), (recording, recorded) = self.missions(), self.recording()
@@ -242,7 +243,7 @@ class GraphModel:
             recorded=recorded,
         )
 
-    def _snapshot(self, name, fixed, wrong):
+    def _snapshot(self, name, fixed, wrong, held):
         """Return the snapshot of a vehicle; one that cannot be drawn must not stop the others."""
         try:
             model = self.models[name]
@@ -250,7 +251,7 @@ class GraphModel:
             fence = f"{model.vehicle.namespace}/geofence: certificate".lstrip("/")
             if not now.reason and fence in wrong:
                 now = now._replace(reason=wrong[fence])
-            return now._replace(is_held=True) if name in self._surroundings.held else now
+            return now._replace(is_held=True) if name in held else now
         except Exception as error:
             self.handle.warn(f"{name} cannot be shown: {error}", throttle=10.0, key=name)
             return VehicleSnapshot(name, state="cannot be shown", reason=str(error))

@@ -204,7 +204,8 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
         if time() != seen:
             seen, seen_at = time(), monotonic()
         elif monotonic() - seen_at > _STALL_LIMIT:
-            raise ServiceError(f"{name}: /clock stands still")
+            text = f"/clock has stood still for {_STALL_LIMIT:g} s; it may still be done"
+            raise ServiceError(f"{name}: {text}")
     return answer.result()
 
 

@@ -45,9 +45,9 @@ def running(*command: object, **options: Any) -> Iterator[subprocess.Popen[Any]]
         yield process
     finally:
         if process.poll() is None:
-            os.killpg(process.pid, signal.SIGINT)
             try:
                 with waiting(f"until {command[0]} has ended"):
+                    os.killpg(process.pid, signal.SIGINT)
                     process.wait(_END_LIMIT)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)

@@ -9,6 +9,7 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from std_srvs.srv import EmptyRequest
 
+from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NODE_CLASSES
 from crazyflie_utils.refusal import ServiceError
@@ -22,11 +23,11 @@ FILTER, FENCE = "/takeoff_control_filter", "/geofence"
 class FencedFlight:
     """sw_geofence.launch, or another, without a master."""
 
-    def __init__(self, file="sw_geofence", **arguments):
+    def __init__(self, file="sw_geofence", classes=None, **arguments):
         _, parameters = expand(
             LAUNCH / f"{file}.launch", composed=True, rviz=False, simulator_dt=0.005, **arguments
         )
-        self.classes = NODE_CLASSES(composed_nodes(parameters))
+        self.classes = {**NODE_CLASSES(composed_nodes(parameters)), **(classes or {})}
         self.graph = FakeGraph(parameters)
         self.status = ""
         self.position = (0.0, 0.0, 0.0)
@@ -195,6 +196,26 @@ def test_another_controller_does_not_leave_the_box_either(controller):
     flight.refer(1.0, 0.0, 1.0)
     flight.graph.advance(8.0)
     assert flight.position == pytest.approx((1.0, 0.0, 1.0), abs=0.1)
+
+
+class OnControlMerger(RegularControlMergerNode):
+    """The merger of other implementations: it publishes with a regular control only."""
+
+    def _on_prioritized(self, message):
+        self._merger.prioritize(*self.split(message.control), self._handle.time())
+
+
+def test_a_merger_that_is_a_period_behind_the_fence_does_not_lead_out():
+    flight = FencedFlight(classes={"control_merger": OnControlMerger}, dynamics="quadrotor")
+    flight.take_off()
+    farthest = 0.0
+    for x, y in ((1.8, 0.0), (2.6, 2.0), (-3.0, 2.0)):
+        flight.refer(x, y, 1.0)
+        for _ in range(40):
+            flight.graph.advance(0.1)
+            farthest = max(farthest, *map(abs, flight.position[:2]))
+    assert 1.4 < farthest < 1.5
+    assert flight.flies
 
 
 def test_flown_straight_at_a_pillar_it_stops_in_front_of_it():

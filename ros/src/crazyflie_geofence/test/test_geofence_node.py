@@ -103,7 +103,7 @@ def test_what_was_sent_while_it_was_waited_for_is_not_in_force_at_once():
     for is_sent in (False, True):
         fake, others = FakeProcess(), {"topics/final_control": "/sent"}
         assert fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, **others})
-        publish_state(fake, 1.85, *STATE[1:3], 0.18, *STATE[4:], stamp=1.0)
+        publish_state(fake, 1.85, *STATE[1:3], 0.2, *STATE[4:], stamp=1.0)
         fake.advance(0.002)
         if is_sent:
             fake.publish("/sent", ControlStamped(control=Control(0.2, 0.2, 0.0, 12.0)))

@@ -147,6 +147,21 @@ def test_in_the_smallest_box_the_walls_never_ask_for_contrary_controls(axis, las
     assert np.all(smallest <= largest + resolution)
 
 
+@given(axes(), st.floats(0.0, 2.0), SPEED, UNIT, UNIT)
+def test_the_smooth_control_is_safe_and_that_of_before_where_it_can_be(axis, room, v, a, last):
+    state = room, v, a * axis.largest, last * axis.largest
+    held, safe = axis.largest_control(*state, axis.smooth_hold), axis.largest_control(*state)
+    smooth = axis.smooth_control(*state)
+    assert held <= smooth <= max(safe, held)
+    assert smooth == held or smooth == min(safe, state[-1])
+
+
+def test_a_little_noise_changes_no_control():
+    """1 mm/s changes what is safe by 0.06 m/s^2."""
+    found = {AXIS.smooth_control(0.25, 0.4 + noise, 0.0, 0.3) for noise in (-1e-3, 0.0, 1e-3)}
+    assert found == {0.3}
+
+
 # Edges of the level set V >= 0 of hj-reachability 0.7 ("very_high" accuracy, 29 x 161 x 81 points,
 # 2.5 s), by hj_level_set.py: velocity, acceleration, largest position that is viable. It is less by
 # up to 0.7 mm; with 81 x 41 velocities and accelerations by 5 mm.

@@ -195,7 +195,7 @@ class Geofence:
         if distance < -axis.position_margin:
             return _return(axis, distance, v)
         last = axis.largest if self._last is None else -plane.along(tuple(self._last))
-        return axis.largest_control(distance, v, a, last, axis.smooth_hold)
+        return axis.smooth_control(distance, v, a, last)
 
     def _catch_up(self, time):
         """Advance the accelerations to the last control that is in force at a time."""

@@ -201,8 +201,8 @@ class Axis:
         largest control before.
         """
         f = _functions(up[1])
-        high = self.largest_control(*up, last[1], self.smooth_hold)
-        low = -self.largest_control(*down, -last[0], self.smooth_hold)
+        high = self.smooth_control(*up, last[1])
+        low = -self.smooth_control(*down, -last[0])
         contrary = low > high
         if not np.any(contrary):
             return low, high
@@ -211,6 +211,15 @@ class Axis:
         low = where(contrary, -self.largest_control(*down, -last[0]), low)
         middle = f.max(f.min((low + high) / 2.0, self.braking), -self.braking)
         return f.min(low, f.max(middle, high)), f.max(high, f.min(middle, low))
+
+    def smooth_control(self, distance: Number, v: Number, a: Number, last: Number) -> Number:
+        """Return what is given of any larger control: at least what could be held for longer.
+
+        As long as that is safe, it is not less than the last one: noise changes nothing between.
+        For the arguments see `largest_control`.
+        """
+        f, smooth = _functions(v), self.largest_control(distance, v, a, last, self.smooth_hold)
+        return f.max(smooth, f.min(self.largest_control(distance, v, a, last), last))
 
     def largest_control(
         self, distance: Number, v: Number, a: Number, last: Number, hold: Response | None = None

@@ -56,7 +56,8 @@ def test_what_a_journal_has_is_printed(path, capsys):
     for line in (
         "began 2026-11-29 12:00:00+01:00",
         '/echo: {"gain": 3.0}',
-        "/number (std_msgs/Float64): 3, 1.3 Hz, from /lab",
+        "/number (std_msgs/Float64): 3, 1.3 Hz, from /lab 2 from 0.00 to 0.10 s, "
+        "from /stranger 1 from 0.20 to 0.20 s",
         "/text (std_msgs/String): 3, 1.3 Hz",
         "/set (std_srvs/SetBool): 1",
         "2.300000 s /set data: True",
@@ -64,6 +65,21 @@ def test_what_a_journal_has_is_printed(path, capsys):
         "called by threads, which cannot be run again:\n  LogTopics.publish: 1",
     ):
         assert line in text
+
+
+def test_long_gaps_of_a_publisher_are_told(tmp_path, capsys):
+    path = tmp_path / "echo.journal"
+    header = {"node": "/echo", "program": "", "clock": "manual", "start": 100.0, "us": 0}
+    writer = JournalWriter(path, header, 1e9, pytest.fail)
+    graph = FakeGraph({}, recorder=lambda name, time: Recorder(writer))
+    graph.start("/echo", EchoNode())
+    for k in range(40):
+        graph.publish("/number", Float64(k), caller="/lab")
+        graph.advance(1.2 if k == 29 else 0.02)
+    graph.end("/echo")
+    assert main([str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "from /lab 40 from 0.00 to 1.96 s, none for 1.20 s before 1.78 s" in text
 
 
 def test_messages_of_a_topic_are_printed_with_times_and_senders(path, capsys):

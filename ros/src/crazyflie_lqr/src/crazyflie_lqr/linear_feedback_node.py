@@ -263,7 +263,7 @@ class LinearFeedbackNode(Node[LinearFeedbackParameters]):
             return False
         # If the clocks agreed before, the message was late.
         cause = (
-            "this computer, or the network, is too busy"
+            "this computer, or the network, is too busy, or poses have old stamps"
             if self._clocks_agree
             else "do the machines' clocks agree?"
         )

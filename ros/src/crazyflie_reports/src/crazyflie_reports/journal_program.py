@@ -1,6 +1,7 @@
 """The program journal: what a journal has, or the messages of one of its topics."""
 
 import argparse
+import itertools
 import json
 import os
 import struct
@@ -18,6 +19,7 @@ from crazyflie_utils.journal.replay_transport import Rows
 
 _GAP = 0.5  #: Time without an input that is listed (s): longer than most periods.
 _MAX_LINES = 20  #: Lines of calls, and of gaps.
+_LONG = 10  #: A gap of so many periods is told, of a topic with more messages than that.
 
 
 class Contents:
@@ -31,7 +33,10 @@ class Contents:
         self.calls: list[str] = []
         self.gaps: list[str] = []
         self.counts: Counter[tuple[Kind, int]] = Counter()
-        self.callers: defaultdict[int, set[str]] = defaultdict(set)
+        #: Subscription -> sender -> times of its messages (s).
+        self.callers: defaultdict[int, defaultdict[str, list[float]]] = defaultdict(
+            lambda: defaultdict(list)
+        )
         self.threads: Counter[str] = Counter()  #: Functions that threads have called.
 
     def rows(self) -> Iterator[Row]:
@@ -47,7 +52,7 @@ class Contents:
     def _count(self, row):
         if row.kind is Kind.MESSAGE:
             self.counts[Kind.SUBSCRIBED, row.number] += 1
-            self.callers[row.number].add(self.sender(row))
+            self.callers[row.number][self.sender(row)].append(self.time)
         elif row.kind is Kind.PUBLISHED:
             self.counts[Kind.ADVERTISED, row.number] += 1
         elif row.kind is Kind.CALL:
@@ -112,14 +117,24 @@ class Contents:
     def _registered(self, kind, number):
         name, type_name = self.name(kind, number)
         count = self.counts[kind, number]
-        callers = ", ".join(sorted(self.callers[number])) if kind is Kind.SUBSCRIBED else ""
         rate = f", {count / self.time:.1f} Hz" if self.time and kind is not Kind.OFFERED else ""
-        return f"{name} ({type_name}): {count:,}{rate}{callers and f', from {callers}'}"
+        callers = self.callers[number] if kind is Kind.SUBSCRIBED else {}
+        texts = [f"from {sender}{_span(times)}" for sender, times in sorted(callers.items())]
+        return ", ".join([f"{name} ({type_name}): {count:,}{rate}", *texts])
 
     def _end(self):
         if self.journal.header["clock"] == "manual":
             return "with a clock set by hand"
         return "ended by itself" if self.names.counts[Kind.SHUTDOWN] else "did not end by itself"
+
+
+def _span(times):
+    """Return number, first and last time of messages, and their longest gap if it is long."""
+    gap, end = max((b - a, b) for a, b in itertools.pairwise([times[0], *times]))
+    mean = (times[-1] - times[0]) / len(times)
+    is_long = gap > max(_GAP, _LONG * mean) and len(times) > _LONG
+    text = f" {len(times):,} from {times[0]:.2f} to {times[-1]:.2f} s"
+    return text + (f", none for {gap:.2f} s before {end:.2f} s" if is_long else "")
 
 
 def _section(title, lines, most=sys.maxsize):

@@ -332,3 +332,42 @@ def test_a_filter_that_is_restarted_without_a_server_lifts_nothing():
     network.advance(3.0)
     assert len(network.on("/control/lqr", begun)) > 200
     assert network.on("/control/final", begun) == []
+
+
+def test_a_filter_that_starts_after_the_server_lifts_nothing_from_a_table():
+    """Without a filter the server took the height for a flight, and the motors began to turn."""
+    network = HoverNetwork(SERVER)
+    for name in ("server", "filter"):
+        network.kill(name)
+    network.vehicle_node.offset = 0.7
+    network.start_server()
+    network.advance(2.0)
+    assert network.last("/in_flight_flight_status") == "flying"
+    reference = PositionVelocityStateStamped()
+    reference.state.z = 1.5
+    network.process("controller").publish("/ref", reference)
+    network.start_filter()
+    network.advance(0.1)
+    begun = network.time
+    network.advance(2.0)
+    assert network.last("/in_flight_flight_status") == "on_ground"
+    assert set(thrusts(network, begun)) == {0.0}
+    assert network.vehicle.z < 0.01
+
+
+def test_a_first_state_that_comes_last_lifts_nothing():
+    """The server waits for it, too, and has not sent zero thrust yet."""
+    network = HoverNetwork(SERVER)
+    for name in ("server", "filter"):
+        network.kill(name)
+    network.vehicle_node.sees = False
+    network.start_filter()
+    network.advance(2.5)
+    reference = PositionVelocityStateStamped()
+    reference.state.z = 1.5
+    network.process("controller").publish("/ref", reference)
+    network.start_server()
+    network.advance(0.6)
+    network.vehicle_node.sees = True
+    network.advance(2.0)
+    assert set(thrusts(network, 0.0)) == {0.0}

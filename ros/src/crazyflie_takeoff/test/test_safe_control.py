@@ -44,6 +44,15 @@ def test_the_thrust_of_hover_is_within_its_range():
     assert hover.value == MOST_HOVER
 
 
+@pytest.mark.parametrize("wrong", [1e6, -1e6, 1e308, -1e308])
+def test_one_wrong_speed_is_no_weight(wrong):
+    """Of another estimator: the vehicle was flown as a heavy one, or with a thrust of nan."""
+    hover = HoverThrust(AVERAGING, G)
+    for k in range(60):
+        hover.update(0.01, G, wrong if k == 40 else 0.0)
+    assert hover.value == pytest.approx(G, rel=0.01)
+
+
 @pytest.mark.parametrize(
     ("roll", "pitch", "vertical"),
     [(0.2, 0.0, 0.9800666), (0.0, 0.2, 0.9800666), (0.2, -0.1, 0.9751703)],

@@ -10,6 +10,7 @@ FIRST = 0.5  #: Time of flight as much as which g counts at first, if nothing el
 LEAST_HOVER, MOST_HOVER = 0.6 * GRAVITY, 1.4 * GRAVITY
 #: Thrust with which each of them sinks: of one that may be light, and is not seen (m/s^2).
 UNSEEN_THRUST = 0.5 * GRAVITY
+MOST_ACCELERATION = 2.0 * GRAVITY  #: More is an error of the speed (m/s^2).
 LAG = 0.08  #: Time by which motors and estimator make a speed later than its thrust (s).
 
 
@@ -50,7 +51,9 @@ class HoverThrust:
         if speed is None:
             self._acceleration = 0.0
         elif self._speed is not None:
-            self._acceleration += share * ((speed - self._speed) / step - self._acceleration)
+            acceleration = (speed - self._speed) / step
+            acceleration = min(max(acceleration, -MOST_ACCELERATION), MOST_ACCELERATION)
+            self._acceleration += share * (acceleration - self._acceleration)
         self._speed = speed
 
     def skip(self, speed: float | None) -> None:

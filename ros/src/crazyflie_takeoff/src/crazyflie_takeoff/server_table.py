@@ -159,7 +159,11 @@ class FlightStateMachine:
 
     def set_filter(self, report: FilterReport) -> bool:
         """Set the status of the filter; return whether the state has changed by it."""
-        self.filter = report
+        is_late, self.filter = self.filter is NO_FILTER, report
+        if is_late and self.state is ServerState.FLYING:
+            # The height alone was taken for a flight: a vehicle may stand on a table.
+            self.state = ServerState.RECOVERING
+            self.recover(self.measured, self.ground)
         return self._judge(FOLLOWS)
 
     def accepts(self, request: Request) -> bool:

@@ -359,7 +359,9 @@ class TakeoffControlFilterNode(Node):
         if not self._has_controller:
             # The next one is new.
             facts.controller_failed = -math.inf
-        if not self._takeoffs.has_publishers():
+        # A server that looks for the state of the flight says it soon.
+        looks = facts.flight is None and self._server.has_publishers()
+        if looks or not self._takeoffs.has_publishers():
             facts.server_missed = facts.ran
             self._memory.clear_until = -math.inf
         self._publish_status()

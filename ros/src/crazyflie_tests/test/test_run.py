@@ -195,7 +195,8 @@ def test_arguments_are_refused_at_once(words, complaint):
 
 def test_the_help_of_a_swarm_is_its_own():
     """It was that of mission, with a script that swarm does not take."""
-    said = subprocess.run([TOP / "run", "swarm", "--help"], capture_output=True, text=True, check=True)
+    command = [TOP / "run", "swarm", "--help"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True)
     assert said.stdout.startswith("usage: run swarm [n|NAME:=VALUE ...]")
 
 

@@ -58,7 +58,8 @@ def test_callers_are_answered_while_hooks_of_the_shutdown_run(monkeypatch):
 
 def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
     monkeypatch.setattr(calls, "_STALL_LIMIT", 0.05)
-    with pytest.raises(ServiceError, match="/go: /clock has stood still for .* s; it may still be done"):
+    text = "/go: /clock has stood still for .* s; it may still be done"
+    with pytest.raises(ServiceError, match=text):
         wait_for_answer(Future(), "/go", lambda: 7.0)
 
 

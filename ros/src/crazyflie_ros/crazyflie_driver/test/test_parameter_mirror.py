@@ -145,7 +145,7 @@ def test_a_master_that_is_frozen_does_not_block_the_jobs_of_a_vehicle(server, ve
     update = server.process.call("/cf1/update_params", UpdateParamsRequest(names))
     following = server.process.call("/cf1/arm", SetBoolRequest(True))
     try:
-        text = "'effect' is no .*; the ROS master .*/cf1/ring/effect within 0.1 s: is it frozen.$"
+        text = "'effect' is not .*; the ROS master .*/cf1/ring/effect within 0.1 s: is it frozen.$"
         with pytest.raises(ServiceError, match=text):
             update.result(10.0)
         assert following.result(10.0).success

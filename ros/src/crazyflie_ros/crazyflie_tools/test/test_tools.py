@@ -103,7 +103,7 @@ def test_a_value_that_cannot_be_set_is_an_error(answer, vehicle, name, text, rea
     ("tool", "arguments", "reason"),
     [
         (tools.get_param, ("--uri", "radio://0/25/2M/E7E7E7E701"), "required: GROUP.NAME"),
-        (tools.get_param, ("a.b", "--uri", "radio:0"), "no address of a vehicle"),
+        (tools.get_param, ("a.b", "--uri", "radio:0"), "not an address of a vehicle"),
         (tools.get_param, ("a.b", "--uri", "radio://0/126/2M"), "no radio channel 126"),
         (tools.set_param, ("a.b", "on"), "'on': expected a finite number"),
         (tools.set_param, ("a.b", "nan"), "expected a finite number"),
@@ -113,7 +113,7 @@ def test_a_value_that_cannot_be_set_is_an_error(answer, vehicle, name, text, rea
         (tools.scan, ("--address", "E7E7E7E7E7E7"), "up to 10 hexadecimal digits"),
         (tools.scan, ("--address", "0x"), "up to 10 hexadecimal digits"),
         (tools.scan, ("--address", "-1"), "--address"),
-        (tools.reboot, ("--uri", "udp://localhost"), "no address of a vehicle"),
+        (tools.reboot, ("--uri", "udp://localhost"), "not an address of a vehicle"),
     ],
 )
 def test_wrong_usage_is_reported_before_anything_is_sent(capsys, tool, arguments, reason):

@@ -56,8 +56,8 @@ def test_what_a_journal_has_is_printed(path, capsys):
     for line in (
         "began 2026-11-29 12:00:00+01:00",
         '/echo: {"gain": 3.0}',
-        "/number (std_msgs/Float64): 3, 1.3 Hz, from /lab 2 from 0.00 to 0.10 s, "
-        "from /stranger 1 from 0.20 to 0.20 s",
+        "/number (std_msgs/Float64): 3, 1.3 Hz, from /lab (2, 0.00 to 0.10 s), "
+        "/stranger (1, 0.20 to 0.20 s)",
         "/text (std_msgs/String): 3, 1.3 Hz",
         "/set (std_srvs/SetBool): 1",
         "2.300000 s /set data: True",
@@ -79,7 +79,7 @@ def test_long_gaps_of_a_publisher_are_told(tmp_path, capsys):
     graph.end("/echo")
     assert main([str(path)]) == 0
     text = capsys.readouterr().out
-    assert "from /lab 40 from 0.00 to 1.96 s, none for 1.20 s before 1.78 s" in text
+    assert "from /lab (40, 0.00 to 1.96 s, none for 1.20 s before 1.78 s)" in text
 
 
 def test_messages_of_a_topic_are_printed_with_times_and_senders(path, capsys):

@@ -119,8 +119,9 @@ class Contents:
         count = self.counts[kind, number]
         rate = f", {count / self.time:.1f} Hz" if self.time and kind is not Kind.OFFERED else ""
         callers = self.callers[number] if kind is Kind.SUBSCRIBED else {}
-        texts = [f"from {sender}{_span(times)}" for sender, times in sorted(callers.items())]
-        return ", ".join([f"{name} ({type_name}): {count:,}{rate}", *texts])
+        texts = [f"{sender} ({_span(times)})" for sender, times in sorted(callers.items())]
+        senders = f", from {', '.join(texts)}" if texts else ""
+        return f"{name} ({type_name}): {count:,}{rate}{senders}"
 
     def _end(self):
         if self.journal.header["clock"] == "manual":
@@ -133,7 +134,7 @@ def _span(times):
     gap, end = max((b - a, b) for a, b in itertools.pairwise([times[0], *times]))
     mean = (times[-1] - times[0]) / len(times)
     is_long = gap > max(_GAP, _LONG * mean) and len(times) > _LONG
-    text = f" {len(times):,} from {times[0]:.2f} to {times[-1]:.2f} s"
+    text = f"{len(times):,}, {times[0]:.2f} to {times[-1]:.2f} s"
     return text + (f", none for {gap:.2f} s before {end:.2f} s" if is_long else "")
 
 

@@ -333,7 +333,7 @@ class Facts:
     ) -> None:
         """Record a takeoff control of the node ``name``; its numbers are ``setpoint``.
 
-        ``stands`` is whether the vehicle is on the ground, where a second server is not contention.
+        ``stands`` is whether the vehicle is on the ground, where a second server does no harm.
         """
         self.advance(now)
         self.servers.note(now, name, OVERLAP if stands else math.inf)

@@ -75,6 +75,45 @@ def test_another_attitude_is_another_pose():
     assert camera.show((0.0, 0.0, 1.001), STILL, rotation=(0.0, 0.0, 1e-9, 1.0)) == [False]
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.0003, 0.003])
+def test_a_body_that_stays_on_the_ground_in_a_takeoff_is_another_one(noise):
+    """With noise, a vehicle of which a body on the ground was shown rose to 43 m and more."""
+    camera = Camera(noise)
+    camera.show((0.0, 0.0, 0.3), None, 1.0)
+    camera.show((0.0, 0.0, 0.3), (0.0, 0.0, 0.2), 1.0)
+    verdicts = camera.show((0.0, 0.0, 0.3), (0.0, 0.0, 6.2), 0.5)
+    assert all(verdicts[32:]) and not any(verdicts[:5])
+    # It was believed before it has come to 1 m.
+    assert camera.show((0.0, 0.0, 0.3), None, 1.0) == [True] * 100
+    # A person takes it in a hand.
+    assert not any(camera.show((0.1, 0.0, 0.8), None, 1.0)[30:])
+
+
+def test_where_a_vehicle_is_whose_poses_have_stayed_on_the_ground():
+    camera = Camera(0.001)
+    camera.show((1.0, 0.0, 0.0), None, 1.0)
+    shown = 0
+    while not any(camera.show((1.0, 0.0, 0.0), (0.0, 0.0, 6.2))):
+        shown += 1
+    position, velocity = camera.monitor.departure
+    assert position == pytest.approx((1.0, 0.0, 0.5 * 6.2 * (0.01 * shown) ** 2), abs=0.03)
+    assert velocity == pytest.approx((0.0, 0.0, 6.2 * 0.01 * shown), abs=0.1)
+
+
+def test_a_heavy_late_vehicle_lifts_off():
+    """Its motors lag by 0.1 s and its poses by 0.06 s; it hovers at g + 3 m/s^2."""
+    camera = Camera(0.001)
+    camera.show((0.0, 0.0, 0.0), None, 1.0)
+    begin, thrust = camera.time, 6.2
+
+    def height(time):
+        t = max(time - begin - 0.06, 0.0)
+        excess = 6.2 - 3.0
+        return max(excess * (0.5 * t * t - 0.1 * t + 0.01 * (1.0 - math.exp(-t / 0.1))), 0.0)
+
+    assert not any(camera.show(lambda t: (0.0, 0.0, height(t)), (0.0, 0.0, thrust), 0.7))
+
+
 def test_on_the_ground_poses_repeat():
     camera = Camera().lift()
     assert not any(camera.move(0.0, start=1.001))
@@ -289,6 +328,6 @@ def test_a_vehicle_that_is_lifted_for_long_is_not_on_the_ground():
     # Beyond 3 m/s^2 for 2.5 s it has made 0.25 m/s; 0.3 m/s lift any vehicle.
     assert not any(camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 2.5))
     assert camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 1.0)[-1]
-    # At another place it restarts.
-    camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1))
+    # With the next takeoff it restarts.
+    camera.show((0.0, 0.0, 0.001), None)
     assert not any(camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1), 2.5))

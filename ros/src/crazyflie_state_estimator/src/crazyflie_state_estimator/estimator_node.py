@@ -151,7 +151,8 @@ _STATUS = {
     Verdict.IMPOSSIBLE: (EstimateStatus.IMPOSSIBLE, "{} cannot have flown to its pose"),
     Verdict.NOT_RESPONDING: (
         EstimateStatus.NOT_RESPONDING,
-        "the poses of {} do not follow its control; is motion capture frozen?",
+        "the poses of {} do not follow its control; is motion capture frozen? Or are they those of "
+        "another body?",
     ),
 }
 
@@ -293,9 +294,10 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
         if status != EstimateStatus.GOOD:
             self._handle.warn(reason, throttle=1.0, key="frozen")
             # The predicted motion, when the measured one has just turned out to be wrong.
-            if verdict is Verdict.REPEATED and was_good and response is not None:
-                return self._estimator.without_last(pose.stamp, response)
             departure = self._monitor.departure
+            is_new = verdict is Verdict.REPEATED and was_good and departure is None
+            if is_new and response is not None:
+                return self._estimator.without_last(pose.stamp, response)
             return departure and EstimatedMotion(*departure, attitude, (0.0, 0.0, 0.0))
         if verdict is Verdict.MOVED:
             self._estimator.reset()

@@ -8,6 +8,7 @@ with new stamps; one with noise is found by the control, see `control_response`.
 import math
 from collections.abc import Sequence
 from enum import Enum
+from typing import NamedTuple
 
 from crazyflie_state_estimator.control_response import Departure, ResponseMonitor
 
@@ -55,6 +56,11 @@ CLEAR = 0.01
 #: proves that it has (m/s).
 HEAVY, LIFTING = 3.0, 0.3
 
+#: Height to which the control has lifted the heaviest vehicle (m), by which the poses of any one
+#: have left the ground: motors and attitude lag by 0.1 s, and poses by 0.06 s.
+RISEN = 0.15
+LONGEST_STEP = 0.1  #: Longest time between two poses in which a control lifts a vehicle (s).
+
 #: Steps smaller than this (m) count as rest.
 _ROUNDING = 1e-6
 LIFTED = 0.04  #: Height of a flying vehicle above the place where its motors were off last (m).
@@ -62,6 +68,19 @@ _LEFT = 0.03  #: Least distance of the poses that show that a camera that froze 
 
 Vector = Sequence[float]
 Pose = tuple[float, Vector]  #: Time (s) and position (m).
+
+
+class _Rise(NamedTuple):
+    """Height (m) and speed (m/s) of a vehicle above the ground, which carries it."""
+
+    height: float = 0.0
+    speed: float = 0.0
+
+    def after(self, step: float, acceleration: float) -> "_Rise":
+        """Return them after ``step`` s of an acceleration (m/s^2)."""
+        speed = self.speed + step * acceleration
+        height = self.height + step * speed
+        return _Rise(height, speed) if height > 0.0 else _Rise()
 
 
 class PoseMonitor:
@@ -99,6 +118,7 @@ class PoseMonitor:
         self._last_step = 0.0
         self._repeats = False
         self._lifting = 0.0
+        self._rise, self._least_rise = _Rise(), _Rise()
         self._time = 0.0
         self._frozen_at: Vector | None = None
         self._outside = 0
@@ -131,13 +151,18 @@ class PoseMonitor:
         elif not self._knows_control:
             self._ground = min(self._ground, position[2])
         height = position[2] - self._ground
-        is_repeated = self._is_repeated(time, position, rotation, acceleration, height)
+        elapsed, self._time = time - self._time, time
+        stays_down = self._stays_down(elapsed, acceleration, height)
+        is_repeated = self._is_repeated(elapsed, position, rotation, acceleration, height)
         if self._frozen_at is not None:
             does_not_respond = self._is_still_frozen(position, self._frozen_at)
         else:
-            does_not_respond = not is_repeated and self._departs(
-                time, position, acceleration, height
+            does_not_respond = not is_repeated and (
+                self._departs(time, position, acceleration, height) or stays_down
             )
+            if does_not_respond:
+                self._frozen_at = position
+                self.departure = self.departure or self._risen(position)
         if does_not_respond or is_repeated:
             self.frozen += 1
             return Verdict.NOT_RESPONDING if does_not_respond else Verdict.REPEATED
@@ -205,12 +230,26 @@ class PoseMonitor:
         # Lower than that, the ground may carry the vehicle.
         if departure is None or height <= LIFTED:
             return False
-        self.departure, self._frozen_at = departure, position
+        self.departure = departure
         return True
 
-    def _is_repeated(self, time, position, rotation, acceleration, height):
+    def _stays_down(self, elapsed, acceleration, height):
+        """Return whether poses stay on the ground although the control has lifted any vehicle."""
+        if acceleration is None or height > LIFTED:
+            self._rise, self._least_rise = _Rise(), _Rise()
+            return False
+        step = min(max(elapsed, 0.0), LONGEST_STEP)
+        self._rise = self._rise.after(step, acceleration[2])
+        self._least_rise = self._least_rise.after(step, acceleration[2] - HEAVY)
+        return self._least_rise.height > RISEN and self._least_rise.speed > LIFTING
+
+    def _risen(self, position):
+        """Return where a vehicle is whose poses have stayed on the ground."""
+        x, y, z = position
+        return Departure((x, y, z + self._rise.height), (0.0, 0.0, self._rise.speed))
+
+    def _is_repeated(self, elapsed, position, rotation, acceleration, height):
         pose, last = (position, rotation), self._seen
-        elapsed, self._time = time - self._time, time
         if pose != last:
             self._repeats, self._lifting = False, 0.0
             self._last_step = 0.0 if last is None else math.dist(position, last[0])
@@ -220,7 +259,8 @@ class PoseMonitor:
             self._repeats = self._repeats or self._last_step > _ROUNDING
         elif acceleration is not None and acceleration[2] > HEAVY:
             self._lifting += (acceleration[2] - HEAVY) * elapsed
-            self._repeats = self._repeats or self._lifting > LIFTING
+            if self._lifting > LIFTING and not self._repeats:
+                self._repeats, self.departure = True, self._risen(position)
         # A pose that repeats still does so after the end of the flight.
         return self._repeats
 

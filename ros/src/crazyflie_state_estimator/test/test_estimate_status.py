@@ -51,6 +51,19 @@ def test_it_is_published_twice_a_second_with_the_stamp_of_the_last_good_pose(act
 
 
 @pytest.mark.parametrize("acts_on_arrival", [False, True])
+def test_poses_that_do_not_come_after_a_reset_of_time_are_missing(acts_on_arrival):
+    """They were good for as long as time had been set back by."""
+    process = launch(act_on_arrival=acts_on_arrival)
+    fly(process, lambda _: ((0.0, 0.0, 1.0), LEVEL), 0.5)
+    process.clock.set(1.0)
+    process.advance(1.0)
+    assert last(process).pose == EstimateStatus.MISSING
+    assert last(process).reason == (
+        "no transform of frame crazyflie has come since time was set back"
+    )
+
+
+@pytest.mark.parametrize("acts_on_arrival", [False, True])
 def test_poses_that_stop_are_missing_and_come_again(acts_on_arrival):
     process = launch(act_on_arrival=acts_on_arrival)
     fly(process, lambda _: ((0.0, 0.0, 1.0), LEVEL), 0.5)

@@ -238,7 +238,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
     def _watch(self):
         # Without arrivals `_estimate` would not run and report the silence.
         now = self._handle.time()
-        if self._silence(now) >= HOLD_LIMIT:
+        if not 0.0 <= self._silence(now) < HOLD_LIMIT:
             self._estimate()
         else:
             self._publish_status(now)
@@ -259,7 +259,7 @@ class StateEstimatorNode(Node[StateEstimatorParameters]):
             # The simulation was reset, and the estimate belongs to the previous run.
             self._estimator.reset()
             self._monitor.reset()
-            self._last_success = now
+            self._last_success = self._last_pose = now
         try:
             pose = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
         except TransformError as error:

@@ -201,11 +201,13 @@ class FrameTree:
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
+        self._cleared: set[str] = set()  # Moving frames that were deleted.
         self._unread: dict[str, bytes] = {}
         self._tf2 = tf2_py.BufferCore(_CACHE)
 
     def clear(self) -> None:
         """Delete all moving frames: time has been reset."""
+        self._cleared |= self._frames.keys()
         self._frames.clear()
         self._unread.clear()
         self._tf2.clear()
@@ -224,6 +226,10 @@ class FrameTree:
                 text = f"frame {name} is not known; looked up {target} -> {source}"
                 raise tf2_py.LookupException(text)
         if chains[0].isdisjoint(chains[1]):
+            for name in chains[0] | chains[1]:
+                if name in self._cleared - self._frames.keys() - self._static.keys():
+                    text = f"no transform of frame {name} has come since time was set back"
+                    raise tf2_py.LookupException(text)
             text = f"frames {target} and {source} are not connected"
             raise tf2_py.ConnectivityException(text)
         path = chains[0] ^ chains[1] or {source}

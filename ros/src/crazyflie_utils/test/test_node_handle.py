@@ -162,6 +162,20 @@ def test_clock_from_outside_moves_time(process, handle):
     assert ticks == [101.5]
 
 
+@pytest.mark.parametrize(("step", "is_told"), [(0.2, True), (0.1, True), (0.02, False)])
+def test_simulated_time_that_moves_in_large_steps_is_told(process, handle, step, is_told):
+    handle.timer(0.01, lambda: None)
+    # One large step is a jump.
+    process.clock.set(500.0)
+    for k in range(1, 30):
+        process.publish("/clock", Clock(handle.stamp(500.0 + k * step)))
+    texts = [each for each in process.logged("warn") if "/clock: simulated time moves" in each]
+    assert len(texts) == is_told
+    if is_told:
+        assert "late; expected at most 0.03 s" in texts[0]
+        assert f"{step - 0.01:.2f} s late" in texts[0]
+
+
 @pytest.mark.parametrize("age", [0.0, 0.25, 70.0])
 def test_age_is_the_time_since_the_stamp(process, handle, age):
     process.advance(1000.0)

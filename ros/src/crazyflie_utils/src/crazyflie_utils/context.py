@@ -30,6 +30,9 @@ from crazyflie_utils.topics import Publisher, Topics, Transport
 FLIGHTS_TOPIC = "/flights"  #: Topic of nodes that start and end flights, latched.
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
+#: Largest time by which a step of simulated time makes timers late, and number of larger ones in a
+#: row that are reported (s).
+_LATE, _LATE_STEPS = 0.03, 10
 _LAND = "is to end: land"  # Of a node without which other nodes' flights end.
 
 
@@ -263,6 +266,8 @@ class ProcessContext:
         self.is_ending = False
         self.is_refused = False  #: Whether another process flies the vehicle of this one's nodes.
         if isinstance(self.clock, SimulatedClock):
+            self._clock_log = NodeLog(self.transport, "/clock", self.machine_time)
+            self._late_steps = 0
             self.clock.on_change(self._run_simulated)
             # Queued with all other work: time does not move within a callback, and a reset does not
             # overtake earlier messages of the simulation.
@@ -340,6 +345,15 @@ class ProcessContext:
         if is_reset:
             self.transforms.clear()
             self._simulated.rebase(now)
+        late = now - self._simulated.next_deadline()
+        self._late_steps = self._late_steps + 1 if late > _LATE else 0
+        if self._late_steps >= _LATE_STEPS:
+            self._clock_log.warn(
+                f"simulated time moves in steps by which timers are {late:.2f} s late; expected at "
+                f"most {_LATE:g} s. Flights will be wrong: its source is to publish more often",
+                throttle=10.0,
+                key="steps",
+            )
         self._simulated.run_due(now)
 
 

@@ -7,6 +7,7 @@ import pytest
 import rospkg
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
+from sensor_msgs.msg import Joy
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_control_merger.merger_nodes import RegularControlMergerNode
@@ -16,17 +17,18 @@ from crazyflie_utils.refusal import ServiceError
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
+EXAMPLES, TELEOP = (
+    Path(rospkg.RosPack().get_path(name)) / "launch"
+    for name in ("crazyflie_examples", "crazyflie_teleop")
+)
 FILTER, FENCE = "/takeoff_control_filter", "/geofence"
 
 
 class FencedFlight:
     """sw_geofence.launch, or another, without a master."""
 
-    def __init__(self, file="sw_geofence", classes=None, **arguments):
-        _, parameters = expand(
-            LAUNCH / f"{file}.launch", composed=True, rviz=False, simulator_dt=0.005, **arguments
-        )
+    def __init__(self, file=EXAMPLES / "sw_geofence.launch", classes=None, **arguments):
+        _, parameters = expand(file, composed=True, rviz=False, simulator_dt=0.005, **arguments)
         self.classes = {**NODE_CLASSES(composed_nodes(parameters)), **(classes or {})}
         self.graph = FakeGraph(parameters)
         self.status = ""
@@ -218,18 +220,38 @@ def test_a_merger_that_is_a_period_behind_the_fence_does_not_lead_out():
     assert flight.flies
 
 
+class PillarFlight(FencedFlight):
+    """Among the obstacles of the laboratory."""
+
+    nearest = math.inf  #: To the middle of the pillar (m).
+
+    def _on_tf(self, message):
+        super()._on_tf(message)
+        x, y, _ = self.position
+        self.nearest = min(self.nearest, math.hypot(x + 1.3, y - 1.2))
+
+    def stopped_in_front_of_it(self):
+        """Return whether it came near: the pillar's radius is 0.15 m, and 0.1 m are kept free."""
+        return self.flies and 0.25 < self.nearest < 0.35
+
+
 def test_flown_straight_at_a_pillar_it_stops_in_front_of_it():
-    flight = FencedFlight("sw_obstacles")
+    flight = PillarFlight(EXAMPLES / "sw_obstacles.launch")
     flight.take_off()
     flight.refer(-1.3, 1.2, 1.0)
-    nearest = math.inf
-    for _ in range(100):
-        flight.graph.advance(0.1)
-        x, y, _ = flight.position
-        nearest = min(nearest, math.hypot(x + 1.3, y - 1.2))
-    # The pillar's radius is 0.15 m, and 0.1 m are kept free.
-    assert 0.25 < nearest < 0.35
-    assert flight.flies
+    flight.graph.advance(10.0)
+    assert flight.stopped_in_front_of_it()
     flight.refer(0.0, 0.0, 1.0)
     flight.graph.advance(10.0)
     assert flight.position == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
+
+
+def test_a_joystick_that_steers_at_the_pillar_stops_in_front_of_it():
+    """The command of the README, by the controller that turns the nose."""
+    flight = PillarFlight(TELEOP / "teleop.launch", flight="sw_obstacles.launch", joy=False)
+    flight.graph.publish("/joy", Joy(buttons=[0, 0, 1]))
+    flight.graph.advance(8.0)
+    for _ in range(100):
+        flight.graph.publish("/joy", Joy(axes=[0.0, 0.0, 0.0, 1.2 / 1.3, -1.0]))
+        flight.graph.advance(0.1)
+    assert flight.stopped_in_front_of_it()

@@ -111,7 +111,9 @@ def test_takeoff_is_called_once_when_it_is_there():
 
 @pytest.mark.parametrize("composed", ["false", "true"])
 @pytest.mark.parametrize("file", ["velocity", "circle", "teleop"])
-@pytest.mark.parametrize("flight", ["sw_hover.launch", "virtual_hw_hover.launch"])
+@pytest.mark.parametrize(
+    "flight", ["sw_hover.launch", "sw_obstacles.launch", "virtual_hw_hover.launch"]
+)
 def test_launch_files(file, flight, composed):
     nodes, parameters = launch_files.expand(
         LAUNCH / f"{file}.launch", flight=flight, composed=composed, rviz="false"

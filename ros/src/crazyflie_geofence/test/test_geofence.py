@@ -169,6 +169,20 @@ def test_near_a_wall_a_control_that_is_safe_is_passed_bit_for_bit():
     assert (control, priority) == (HOVER, 1.0)
 
 
+def test_near_a_wall_a_thrust_that_is_safe_is_passed_whatever_the_battery_leaves():
+    """Only the fence's own controls ask for less: a climb beside a wall is the regular one's."""
+    made = Geofence(LOWER, UPPER, AXES, max_thrust=12.7)
+    climb = (0.0, 0.0, 0.3, 15.0)
+    for k in range(100):
+        made.sent(-1.0 + k * PERIOD, HOVER, 0.0)
+    beside = (UPPER[0] - 0.05, 0.1, LOWER[2] + 0.3)
+    assert made.control(0.0, beside, AT_REST, 0.0, climb) == (climb, 1.0)
+    # What it changes has no more than that.
+    faster = (0.3, 0.0, 0.0)
+    control, _ = made.control(PERIOD, beside, faster, 0.0, (0.0, 0.2, 0.3, 15.0))
+    assert control[3] <= 12.7
+
+
 def test_a_clock_that_steps_back_leaves_it_at_work():
     position, velocity = (UPPER[0] - 0.3, 0.1, 1.4), (1.5, 0.0, 0.0)
     before = hovering().control(0.0, position, velocity, 0.0, HOVER)

@@ -122,7 +122,7 @@ def is_needed(fence, time, position, velocity, regular, yaw, before):
     what it adds: a bend between samples, and the time for which it could hold its own controls.
     """
     moves = fence._predict(time, tuple(velocity))
-    wanted = fence._acceleration_of(regular, yaw)
+    wanted = coupled_acceleration(regular, yaw)
     for i, (low, high, axis) in enumerate(fence._walls):
         for sign, room, (way, v, a) in (
             (1.0, high - position[i], moves[i]),

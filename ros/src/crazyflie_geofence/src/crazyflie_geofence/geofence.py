@@ -63,7 +63,7 @@ class Geofence:
     axes : sequence of Axis, 3
         Bounds of the vehicle along x, y and z.
     max_thrust : float
-        Largest thrust over the mass that the vehicle has, m/s^2.
+        Largest thrust over the mass that the fence's own controls ask for, m/s^2.
     obstacles : Obstacles
         What stands in the box.
     """
@@ -168,18 +168,19 @@ class Geofence:
         walls = zip(self._walls, states[0:6:2], states[1:6:2], lasts, strict=True)
         ranges = [_range(axis, up, down, last) for (_, _, axis), up, down, last in walls]
         limits = [
-            (plane, self._most(plane, *each))
+            (plane, self._axis(plane).braking, self._most(plane, *each))
             for plane, each in zip(planes, states[6:], strict=True)
         ]
-        wanted = self._acceleration_of(regular, yaw)
+        wanted = _acceleration_of(regular, yaw)
+        if _allowed(wanted, ranges, limits) == wanted:
+            self._last = wanted
+            return _limited(regular, MAX_THRUST), 1.0
+        wanted = _acceleration_of(regular, yaw, self._max_thrust)
         nearest = _allowed(wanted, ranges, limits)
-        if nearest == wanted:
-            self._last = nearest
-            return self._limited(regular), 1.0
         safe = _allowed(_HOVER, ranges, limits)
         self._last = self._producible(safe, nearest, yaw)
         roll, pitch, thrust = _control(self._last, yaw)
-        return self._limited((roll, pitch, regular[2], thrust)), 1.0
+        return _limited((roll, pitch, regular[2], thrust), self._max_thrust), 1.0
 
     def _axis(self, plane: Plane) -> Axis:
         """Return the bounds along a plane's normal: x has those of every horizontal line."""
@@ -203,7 +204,7 @@ class Geofence:
             sent, control, heading = self._new.popleft()
             # Below the thrust of flights the vehicle stands.
             flies = control[3] >= MIN_THRUST
-            u = self._acceleration_of(control, heading) if flies else _HOVER
+            u = _acceleration_of(control, heading) if flies else _HOVER
             towards = zip((*u, *(-part for part in u)), self._axes * 2, strict=True)
             self._sent.append((sent, [max(part, -axis.braking) for part, axis in towards]))
             if not flies:
@@ -250,19 +251,6 @@ class Geofence:
             moves.append(state)
         return moves
 
-    def _acceleration_of(self, control, yaw):
-        return coupled_acceleration(self._limited(control), yaw)
-
-    def _limited(self, control):
-        """Return what the vehicle is given, and has, of a control."""
-        roll, pitch, yaw_dot, thrust = control
-        return (
-            clip(roll, -MAX_TILT, MAX_TILT),
-            clip(pitch, -MAX_TILT, MAX_TILT),
-            yaw_dot,
-            clip(thrust, MIN_THRUST, self._max_thrust),
-        )
-
     def _producible(self, safe, nearest, yaw):
         """Return the accelerations of a control nearest to ``nearest``, on the line to ``safe``."""
         if self._is_producible(nearest, yaw):
@@ -285,6 +273,21 @@ class Geofence:
         )
 
 
+def _acceleration_of(control, yaw, max_thrust=MAX_THRUST):
+    """Return the accelerations that a control asks for, within the limits of all vehicles."""
+    return coupled_acceleration(_limited(control, max_thrust), yaw)
+
+
+def _limited(control, max_thrust):
+    roll, pitch, yaw_dot, thrust = control
+    return (
+        clip(roll, -MAX_TILT, MAX_TILT),
+        clip(pitch, -MAX_TILT, MAX_TILT),
+        yaw_dot,
+        clip(thrust, MIN_THRUST, max_thrust),
+    )
+
+
 def _along(plane, towards):
     """Return the part towards a plane of what is known towards each of the six walls."""
     return sum(
@@ -299,12 +302,29 @@ def _allowed(wanted, ranges, limits):
     the vehicle stays in the box.
     """
     u = [clip(w, low, high) for w, (low, high) in zip(wanted, ranges, strict=True)]
+    for plane, braking, most in limits:
+        ranges = [
+            _capped(each, n, most + braking * (sum(map(abs, plane.normal)) - abs(n)))
+            for each, n in zip(ranges, plane.normal, strict=True)
+        ]
     for _ in range(_PROJECTIONS if limits else 0):
-        for plane, most in limits:
+        for plane, _, most in limits:
             excess = max(-plane.along(tuple(u)) - most, 0.0)
             u = [part + excess * n for part, n in zip(u, plane.normal, strict=True)]
         u = [clip(w, low, high) for w, (low, high) in zip(u, ranges, strict=True)]
     return u
+
+
+def _capped(limits, normal, most):
+    """Return a range in which the part towards a plane is at most ``most``.
+
+    Of an acceleration away from the plane along the other axis, the vehicle may have no more than
+    the braking: one along this axis must not need more. Inside of the range that is given.
+    """
+    low, high = limits
+    if normal < 0.0:
+        return low, max(min(high, -most / normal), low)
+    return (min(max(low, -most / normal), high) if normal else low), high
 
 
 def _range(axis, up, down, last):

@@ -16,9 +16,6 @@ Triple = tuple[float, float, float]
 #: How much further than beside each other vehicles are kept above each other.
 DOWNWASH = 2.0
 
-#: Where on its way past a round obstacle a plane faces the vehicle.
-_PASSING_SHARES = (0.0, 0.5, 0.75, 1.0)
-
 
 class Plane(NamedTuple):
     """The vehicle stays where normal . position >= offset."""
@@ -54,8 +51,9 @@ def planes(shape: Shape, position: Triple, velocity: Triple, clearance: float) -
         ahead, left, vx, vy = position[0] - x, position[1] - y, velocity[0], velocity[1]
         # Until it is nearest, if it flies straight on.
         passing = max(-(ahead * vx + left * vy), 0.0) / max(vx * vx + vy * vy, 1e-9)
-        for share in _PASSING_SHARES:
-            to_x, to_y = ahead + share * passing * vx, left + share * passing * vy
+        # The planes that face it now, and there.
+        for time in (0.0, passing):
+            to_x, to_y = ahead + time * vx, left + time * vy
             distance = math.hypot(to_x, to_y)
             a, b = (to_x / distance, to_y / distance) if distance > 0.0 else (1.0, 0.0)
             found.append(Plane((a, b, 0.0), a * x + b * y + half_x))

@@ -425,7 +425,7 @@ def test_fields_of_topics_are_plotted_by_a_tree_and_kept_in_the_address(browser,
     driver.get(driver.current_url)
     wait_for(lambda: {*server.dashboard.fields_shown} >= expected, "fields of the layout")
     chart = "getElement(document.querySelector('.chart').id.slice(1))"
-    titles = f"return {chart}.options.title.map((each) => each.text)"
+    titles = f"return {chart}.chart.getOption().title.map((each) => each.text)"
     wait_for(lambda: any("imu/x" in each for each in driver.execute_script(titles)), "its plot")
 
 
@@ -935,3 +935,12 @@ def test_the_bar_has_one_height(browser, driver, server):
                 assert driver.execute_script(f"return {inner}", emergency), (width, missions)
     finally:
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_vehicles_of_the_address_that_are_found_later_have_plots(browser, driver, server):
+    server.dashboard.set_vehicles()
+    driver.get(server.url + "?vehicles=cf1")
+    browser.has("0 vehicles", ".summary")
+    wait_for(lambda: server.dashboard.pages.pages, "a connection")
+    server.dashboard.set_vehicles(vehicle("cf1", 0.0))
+    wait_for(lambda: server.dashboard.watched == ("cf1",), "plots of cf1")

@@ -1,17 +1,18 @@
 """Plots of a minute of the vehicles that are chosen, that can be stopped, measured and kept."""
 
-import json
 import math
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
-from nicegui import context, ui
+from nicegui import context, json, ui
+from nicegui.elements.mixins.value_element import ValueElement
 from nicegui.events import GenericEventArguments, ValueChangeEventArguments
 
-from crazyflie_dashboard.page.scene_view import COLORS
+from crazyflie_dashboard.page.scene_view import ANSWER_LIMIT, COLORS
 from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.page_data import Series
 from crazyflie_dashboard.snapshot import Scene
@@ -50,6 +51,35 @@ TOOLTIP = {
 }
 SPLIT_LINE = {"lineStyle": {"color": "rgba(128, 128, 128, 0.25)"}}
 
+ui.echart  # noqa: B018  Registers ECharts.
+
+
+class Chart(ValueElement, component="chart.js"):  # type: ignore[call-arg]
+    """Plots; the value has their options and height, as JSON."""
+
+    VALUE_PROP = "options"
+
+    def __init__(self) -> None:
+        self._text = json.dumps(chart([], False))
+        super().__init__(value=self._text)
+        self._sent_at = -math.inf
+        self.on("drawn", self._on_drawn)
+
+    def draw(self, options: dict[str, Any]) -> None:
+        """Draw options of ECharts."""
+        text = json.dumps(options)
+        if text != self._text:
+            self._sent_at = time.monotonic()
+            self.value = self._text = text
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether the browser still draws what it was sent."""
+        return time.monotonic() - self._sent_at < ANSWER_LIMIT
+
+    def _on_drawn(self) -> None:
+        self._sent_at = -math.inf
+
 
 class Line(NamedTuple):
     """A line of a plot: its series, by the name that the plot shows, and its color."""
@@ -80,8 +110,8 @@ class PlotsPanel:
             self._tree = ui.tree([], tick_strategy="leaf", on_tick=self._tick)
             self._tree.props("dense no-transition")
         self._nodes: list[dict[str, Any]] = []
-        self._chart = ui.echart({"series": []}, theme=None).classes("chart")
-        self._chart.on("chart:datazoom", self._zoom, ["batch", "start", "end"])
+        self._chart = Chart()
+        self._chart.on("zoom", self._zoom, ["batch", "start", "end"])
         self._figures = ui.table(
             columns=[
                 {"name": name, "label": name, "field": name, "align": "left" if k == 0 else "right"}
@@ -99,7 +129,7 @@ class PlotsPanel:
 
     def refresh(self, scene: Scene) -> None:
         """Draw the newest numbers, or those before the moment that is shown, unless stopped."""
-        if self.is_stopped:
+        if self.is_stopped or self._chart.is_drawing:
             return
         names = self._session.plotted
         self._name.text = ", ".join(names) or "Select a vehicle to see its plots"
@@ -140,10 +170,10 @@ class PlotsPanel:
     def _table(self) -> None:
         """Let the browser keep the numbers that are seen."""
         rows = (
-            f"{line.vehicle},{line.field},{line.series.unit},{time:.3f},{value:.9g}\n"
+            f"{line.vehicle},{line.field},{line.series.unit},{moment:.3f},{value:.9g}\n"
             for line in self._lines
-            for time, value in zip(line.series.times, line.series.values, strict=True)
-            if self._window[0] <= time <= self._window[1]
+            for moment, value in zip(line.series.times, line.series.values, strict=True)
+            if self._window[0] <= moment <= self._window[1]
         )
         ui.download.content(
             'vehicle,field,unit,"time before what is shown, s",value\n' + "".join(rows),
@@ -151,13 +181,7 @@ class PlotsPanel:
         )
 
     def _draw(self) -> None:
-        options = chart(self._lines, self.is_stopped)
-        self._chart.style(f"height: {options.pop('height')}px")
-        if self._chart.options == options:
-            return
-        self._chart.options.clear()
-        self._chart.options.update(options)
-        self._chart.update()
+        self._chart.draw(chart(self._lines, self.is_stopped))
 
     def _turn(self) -> None:
         self._figures.set_visibility(not self.is_stopped)

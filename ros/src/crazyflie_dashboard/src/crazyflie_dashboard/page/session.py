@@ -44,6 +44,7 @@ class Session:
         self.on_seek: Callable[[], None] = lambda: None  #: Called when it has changed.
         #: Called once, when the page is connected, with what it had before it was loaded again.
         self.on_restore: list[Callable[[dict[str, Any]], None]] = []
+        self._received: tuple[int, tuple[str, ...]] = (0, ())
         self._client = client
         asked = client.request.query_params.get("vehicles", "")
         self._asked = tuple(filter(None, asked.split(",")))
@@ -69,7 +70,7 @@ class Session:
                 self.show_in_address(vehicles=self.chosen)
             for each in restore:
                 each(kept)
-        self.dashboard.watch(self.page, self.plotted)
+        self.watch_plotted()
 
     def look_back(self, ago: float | None) -> None:
         """Show the moment some time ago (s), or the present."""
@@ -85,6 +86,13 @@ class Session:
     def plotted(self) -> tuple[str, ...]:
         """The vehicles whose plots are shown: those that are chosen, or the last one that was."""
         return self.chosen_names[:MAX_PLOTTED] or ((self.watched,) if self.watched else ())
+
+    def watch_plotted(self) -> None:
+        """Have the plots received; vehicles that were chosen before a reload may come later."""
+        plotted = self.page, self.plotted
+        if self.page and plotted != self._received:
+            self._received = plotted
+            self.dashboard.watch(*plotted)
 
     def keep(self, **values: Any) -> None:
         """Keep values, by name, until the page is loaded again in its tab."""
@@ -131,7 +139,7 @@ class Session:
         self.chosen = self.chosen ^ set(names) if is_added else set(names)
         if names:
             self.watched = names[-1]
-        self.dashboard.watch(self.page, self.plotted)
+        self.watch_plotted()
         self.keep(chosen=sorted(self.chosen), watched=self.watched)
         self.show_in_address(vehicles=self.chosen_names)
 

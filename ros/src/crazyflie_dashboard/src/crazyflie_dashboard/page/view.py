@@ -208,6 +208,7 @@ class View:
         is_busy = scene.recording not in ("", "recording")
         allow(self._record, why or (scene.recording if is_busy else ""))
         self._show_control()
+        self._session.watch_plotted()
         self._strips.refresh(time.monotonic(), self._session.obstacle)
         self._timebar.refresh(time.monotonic(), scene)
         is_now = self._session.past is None

@@ -9,7 +9,7 @@ import matplotlib.image
 import pytest
 from distributed import LocalCluster
 
-from crazyflie_batch import figure, monte_carlo
+from crazyflie_batch import certify, figure, monte_carlo
 from crazyflie_batch.monte_carlo_command import main
 from crazyflie_batch.settings import read_settings
 from crazyflie_utils.testing.programs import free_port
@@ -215,3 +215,10 @@ def test_a_scheduler_without_workers_is_told(command, monkeypatch):
         status, _, errors = command("--scheduler", cluster.scheduler_address)
     assert status == 1
     assert "has no workers; expected at least one" in errors
+
+
+@pytest.mark.parametrize("command", [main, certify.main])
+def test_without_a_file_the_shipped_settings_are_read(command, capsys):
+    with pytest.raises(SystemExit):
+        command(["--help"])
+    assert "[SETTINGS.yaml]" in capsys.readouterr().out

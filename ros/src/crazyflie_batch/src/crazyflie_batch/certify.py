@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from rospkg import RosPack
 from tqdm import tqdm
 from typing_extensions import override
 
@@ -217,7 +218,10 @@ def read_settings(path: str) -> CertifyParameters:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; return 0 if no flight within the bounds left, 1 otherwise or for errors."""
     parser = argparse.ArgumentParser(prog="certify", description=_DESCRIPTION)
-    parser.add_argument("settings", metavar="SETTINGS.yaml")
+    shipped = Path(RosPack().get_path("crazyflie_batch"), "config", "certify.yaml")
+    parser.add_argument(
+        "settings", nargs="?", default=str(shipped), metavar="SETTINGS.yaml", help="(%(default)s)"
+    )
     try:
         settings = read_settings(parser.parse_args(arguments).settings)
         with ProcessPoolExecutor(len(os.sched_getaffinity(0))) as executor:

@@ -7,7 +7,9 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 
+from rospkg import RosPack
 from tqdm import tqdm
 
 from crazyflie_batch.code_version import OtherFlightsError
@@ -67,7 +69,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser():
     parser = argparse.ArgumentParser(prog="monte_carlo", description=_DESCRIPTION)
-    parser.add_argument("settings", metavar="SETTINGS.yaml")
+    shipped = Path(RosPack().get_path("crazyflie_batch"), "config", "monte_carlo.yaml")
+    parser.add_argument(
+        "settings", nargs="?", default=str(shipped), metavar="SETTINGS.yaml", help="(%(default)s)"
+    )
     parser.add_argument(
         "--out",
         metavar="FOLDER",

@@ -783,6 +783,7 @@ def test_two_recordings_are_compared_on_one_page(browser, server, tmp_path):
     browser.has("1 recording")
     # One that has been made while another panel was shown.
     browser.tab("Vehicles")
+    wait_for(lambda: browser.find(browser.card("cf1")).is_displayed(), "another panel")
     server.dashboard.recorded = FakeDashboard().recorded
     browser.tab("Recordings")
     browser.has("2 recordings")
